@@ -1,0 +1,34 @@
+# The commands of the project; `make help` lists them.
+.DEFAULT_GOAL := help
+SHELL := bash
+.PHONY: help setup reproduce test asan bench lint
+ARGS ?=
+env := . workflows/env.sh &&
+
+help:  ## list these commands
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+
+setup:  ## system packages, .venv and the compiled package (two minutes once, then a second)
+	@bash workflows/setup.sh
+
+reproduce:  ## every figure and verdict of the paper into results/ (ARGS go to snakemake)
+	@bash workflows/run.sh $(ARGS)
+
+test:  ## all C++ and Python tests (ARGS go to pytest)
+	@bash tests/run.sh $(ARGS)
+
+asan: setup  ## the C++ tests under the address and undefined behaviour sanitizers
+	@$(env) cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
+
+bench: setup  ## the benchmarks alone (ARGS go to pytest)
+	@$(env) python -m pytest -o addopts="--import-mode=importlib" --benchmark-only $(ARGS) tests/benchmarks
+
+lint: setup  ## format, style, types and layers
+	@$(env) ruff check . && ruff format --check . && mypy && lint-imports
+	@$(env) snakefmt --check Snakefile workflows
+	@if command -v clang-format >/dev/null; then \
+	  git ls-files '*.cpp' '*.hpp' | xargs -r clang-format --dry-run --Werror; \
+	else echo "clang-format is not installed: C++ format not checked"; fi
+	@if command -v clang-tidy >/dev/null; then \
+	  $(env) cmake --preset tidy >/dev/null && cmake --build --preset tidy; \
+	else echo "clang-tidy is not installed: C++ not analysed"; fi

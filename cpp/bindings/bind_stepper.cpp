@@ -1,0 +1,130 @@
+#include "bindings.hpp"
+#include "warmslip/stepper.hpp"
+
+namespace warmslip::bindings {
+namespace {
+
+template <int d>
+void bind(py::module_& m) {
+  using R = StepReport<d>;
+  py::class_<R>(m, name<d>("StepReport").c_str(), "What one step did.")
+      .def_readonly("outcome", &R::outcome)
+      .def_readonly("stage", &R::stage)
+      .def_readonly("newton_iterations", &R::newton_iterations)
+      .def_readonly("open", &R::open)
+      .def_readonly("stick", &R::stick)
+      .def_readonly("slip", &R::slip)
+      .def_readonly("max_penetration", &R::max_penetration, "length")
+      .def_readonly("normal_force", &R::normal_force, "int p_nu, force")
+      .def_readonly("traction", &R::traction, "int sigma nu over Gamma_C, (d)")
+      .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
+      .def_readonly("ledger", &R::ledger);
+
+  using S = Stepper<d>;
+  py::class_<S, std::shared_ptr<S>>(m, name<d>("Stepper").c_str(), "Backward Euler with a fixed step (collective).")
+      .def(py::init([](const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface,
+                       double k, Coupling coupling, Backend backend, const ContactOptions& contact) {
+             return std::make_shared<S>(layout, problem, operators, surface, StepperOptions{k, coupling, backend, contact});
+           }), py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("surface"), py::kw_only(), py::arg("k"),
+           py::arg("coupling"), py::arg("backend"), py::arg("contact"), py::keep_alive<1, 2>(), py::keep_alive<1, 3>(),
+           py::keep_alive<1, 4>(), py::keep_alive<1, 5>())
+      .def("start", &S::start, py::arg("u"), py::arg("w"), py::arg("theta"), py::arg("gap"), py::arg("time"))
+      .def("advance", [](S& s, Vec force, Vec heat, const Eigen::VectorXd& gap) { return s.advance({force, heat, gap}); },
+           py::arg("force"), py::arg("heat"), py::arg("gap"), "One step; the state stays when the outcome is not right.")
+      .def_property_readonly("u", [](const S& s) { return share(s.level().u); }, "Displacement. The vectors change owner at every step: ask again.")
+      .def_property_readonly("w", [](const S& s) { return share(s.level().w); }, "Velocity.")
+      .def_property_readonly("theta", [](const S& s) { return share(s.level().theta); }, "Temperature.")
+      .def_property_readonly("time", &S::time)
+      .def_property_readonly("contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")
+      .def_property_readonly("contact_displacement", [](const S& s) { return s.level().contact_u; }, "(d points)")
+      .def_property_readonly("status", [](const S& s) {
+        std::vector<int> status;
+        for (const Status one : s.status()) status.push_back(static_cast<int>(one));
+        return status;
+      }, "0 open, 1 stick, 2 slip, a point")
+      .def_property_readonly("cost", &S::cost)
+      .def_property_readonly("momentum_factor", [](S& s) -> Factor& { return s.momentum_factor(); }, py::return_value_policy::reference_internal)
+      .def_property_readonly("heat_factor", [](S& s) { return s.heat_factor(); }, py::return_value_policy::reference_internal)
+      .def_property_readonly("solver", &S::solver, "The factorizations in words.");
+}
+
+}  // namespace
+
+void bind_stepper(py::module_& m) {
+  py::enum_<Coupling>(m, "Coupling")
+      .value("staggered", Coupling::staggered)
+      .value("lagged", Coupling::lagged)
+      .value("monolithic", Coupling::monolithic);
+  py::enum_<Outcome>(m, "Outcome")
+      .value("right", Outcome::right)
+      .value("contact_not_converged", Outcome::contact_not_converged)
+      .value("not_finite", Outcome::not_finite);
+  py::enum_<Stage>(m, "Stage")
+      .value("none", Stage::none)
+      .value("newton", Stage::newton)
+      .value("line_search", Stage::line_search)
+      .value("fixed_point", Stage::fixed_point)
+      .value("enumeration", Stage::enumeration);
+  py::class_<ContactOptions>(m, "ContactOptions")
+      .def(py::init<>())
+      .def_readwrite("tolerance", &ContactOptions::tolerance)
+      .def_readwrite("newton_steps", &ContactOptions::newton_steps)
+      .def_readwrite("fixed_point_steps", &ContactOptions::fixed_point_steps)
+      .def_readwrite("enumerate_points", &ContactOptions::enumerate_points);
+
+  auto ledger = py::class_<Ledger>(m, "Ledger", "Terms and relative residuals of the balances of one step.");
+  py::list terms;
+  const auto term = [&](const char* attribute, double Ledger::*member) {
+    ledger.def_readonly(attribute, member);
+    terms.append(attribute);
+  };
+  term("kinetic", &Ledger::kinetic);
+  term("elastic", &Ledger::elastic);
+  term("contact", &Ledger::contact);
+  term("kinetic_change", &Ledger::kinetic_change);
+  term("elastic_change", &Ledger::elastic_change);
+  term("contact_change", &Ledger::contact_change);
+  term("inertia_damping", &Ledger::inertia_damping);
+  term("elastic_damping", &Ledger::elastic_damping);
+  term("contact_damping", &Ledger::contact_damping);
+  term("viscous", &Ledger::viscous);
+  term("friction", &Ledger::friction);
+  term("load_work", &Ledger::load_work);
+  term("expansion_work", &Ledger::expansion_work);
+  term("gap_work", &Ledger::gap_work);
+  term("heat_change", &Ledger::heat_change);
+  term("heat_damping", &Ledger::heat_damping);
+  term("conducted", &Ledger::conducted);
+  term("exchanged", &Ledger::exchanged);
+  term("supplied", &Ledger::supplied);
+  term("heating", &Ledger::heating);
+  term("energy_residual", &Ledger::energy_residual);
+  term("heat_residual", &Ledger::heat_residual);
+  term("force_residual", &Ledger::force_residual);
+  term("law_residual", &Ledger::law_residual);
+  term("law_floor", &Ledger::law_floor);
+  ledger.attr("terms") = py::tuple(terms);
+
+  auto cost = py::class_<Cost>(m, "Cost", "What a run cost so far: CPU seconds of this process, counts, bytes of the factors.");
+  py::list items;
+  const auto item = [&](const char* attribute, auto member) {
+    cost.def_readonly(attribute, member);
+    items.append(attribute);
+  };
+  item("setup_seconds", &Cost::setup_seconds);
+  item("step_seconds", &Cost::step_seconds);
+  item("momentum_seconds", &Cost::momentum_seconds);
+  item("contact_seconds", &Cost::contact_seconds);
+  item("heat_seconds", &Cost::heat_seconds);
+  item("steps", &Cost::steps);
+  item("substitutions", &Cost::substitutions);
+  item("factorizations", &Cost::factorizations);
+  item("dense_factorizations", &Cost::dense_factorizations);
+  item("newton_iterations", &Cost::newton_iterations);
+  item("factor_bytes", &Cost::factor_bytes);
+  cost.attr("items") = py::tuple(items);
+  bind<2>(m);
+  bind<3>(m);
+}
+
+}  // namespace warmslip::bindings

@@ -1,0 +1,42 @@
+// Gamma_C in a discretised body: where the contact law is evaluated, with which weights, and how forces reach the nodes.
+#pragma once
+#include <Eigen/Sparse>
+
+#include "warmslip/layout.hpp"
+#include "warmslip/problem.hpp"
+
+namespace warmslip {
+
+/// The same on every rank: contact nodes are few. Clamped nodes are left out, their reaction is the support's.
+template <int d>
+class ContactSurface {
+ public:
+  ContactSurface(const Layout<d>& layout, const Problem<d>& problem);
+
+  Eigen::Index points() const { return weights_.size(); }
+  Eigen::Index nodes() const { return static_cast<Eigen::Index>(nodes_.size()); }
+  const RealTable<d>& positions() const { return positions_; }  ///< (points, d)
+  const RealTable<d>& normals() const { return normals_; }      ///< (points, d), outward
+  const Eigen::VectorXd& weights() const { return weights_; }   ///< (points), area
+  bool nodal() const { return nodal_; }
+
+  /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d nodes).
+  std::vector<PetscInt> unknowns(int block) const;
+  /// Displacement-like values of the contact nodes, (d nodes), on every rank.
+  Eigen::VectorXd nodal_values(Vec v) const;
+  /// Values at the contact points, (d points), and the transpose: forces at the points as nodal forces.
+  Eigen::VectorXd at_points(const Eigen::VectorXd& nodal) const;
+  Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
+  /// Compliance of the points from the compliance of the nodes.
+  Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
+
+ private:
+  const Layout<d>& layout_;
+  std::vector<Index> nodes_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
+  RealTable<d> positions_, normals_;
+  Eigen::VectorXd weights_;
+  bool nodal_;
+};
+
+}  // namespace warmslip

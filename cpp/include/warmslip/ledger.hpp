@@ -1,0 +1,41 @@
+// The balances every step must close to round-off: energy, heat, force and moment, and the contact law itself.
+// They are computed from the step's result with the un-eliminated operators, not from the solver's own residuals.
+#pragma once
+#include "warmslip/contact_surface.hpp"
+#include "warmslip/operators.hpp"
+
+namespace warmslip {
+
+/// What the ledger reads of one time level.
+struct Level {
+  VecHandle u, w, theta;                                       ///< displacement, velocity, temperature
+  VecHandle mass_w, elastic_u, mass_theta;                     ///< M w (without rho), A u, M theta
+  VecHandle expansion_theta, heating_w;                        ///< G theta, E w
+  Eigen::VectorXd contact_u, gap;                              ///< u at the contact points (d points), g (points)
+};
+
+/// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0.
+struct Ledger {
+  double kinetic, elastic, contact;                            ///< stored at the end of the step
+  double kinetic_change, elastic_change, contact_change;
+  double inertia_damping, elastic_damping, contact_damping;    ///< backward Euler's own dissipation
+  double viscous, friction;
+  double load_work, expansion_work, gap_work;
+  double heat_change, heat_damping, conducted, exchanged, supplied, heating;  ///< the same balance for theta
+  double energy_residual, heat_residual, force_residual, law_residual, law_floor;  ///< relative to the largest term
+};
+
+struct StepInputs {
+  double k;
+  Vec force, heat;                     ///< load vectors
+  Vec expansion_theta, heating_w;      ///< the ones the coupling used
+  const Eigen::VectorXd& contact_force;   ///< at the points, (d points)
+  const Eigen::VectorXd& contact_free;    ///< velocity the points would have without contact, for the law's scale
+};
+
+/// Closes the books of the step from `before` to `after`.
+template <int d>
+Ledger close(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+             const ContactSurface<d>& surface, const Level& before, const Level& after, const StepInputs& inputs);
+
+}  // namespace warmslip

@@ -1,0 +1,71 @@
+// The constant matrices of a problem, assembled once, and the quadratures that turn data into load vectors.
+#pragma once
+#include <optional>
+
+#include "warmslip/layout.hpp"
+#include "warmslip/problem.hpp"
+#include "warmslip/quadrature.hpp"
+
+namespace warmslip {
+
+/// Matrices in the paper's letters, without boundary conditions. w and u have block size d, theta 1.
+template <int d>
+struct Operators {
+  Operators(const Layout<d>& layout, const Problem<d>& problem);
+
+  MatHandle mass;          ///< (theta, eta), consistent
+  MatHandle vector_mass;   ///< rho (w, v), the same matrix for every component
+  MatHandle elasticity;    ///< a(u, v)
+  MatHandle viscosity;     ///< b(w, v)
+  MatHandle conductivity;  ///< d(theta, eta)
+  MatHandle expansion;     ///< m(theta, v): rows v, columns theta
+  MatHandle heating;       ///< e(w, eta): rows eta, columns w
+  MatHandle exchange;      ///< int k_c theta eta over Gamma_C, consistent
+  std::vector<PetscInt> clamped;  ///< global scalar indices with u = 0, owned by this rank
+  std::vector<PetscInt> cooled;   ///< global nodes with theta = 0, owned by this rank
+};
+
+/// rho M / k + B + k A with the clamped rows and columns replaced by the identity.
+template <int d>
+MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k);
+
+/// M / k + D + J with the cooled rows and columns replaced by the identity.
+template <int d>
+MatHandle heat_matrix(const Operators<d>& operators, double k);
+
+/// Both in one, with block size d+1, (w, theta) a node: [K, -G; -scale E, scale H], for the monolithic coupling.
+template <int d>
+MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k, double scale);
+
+/// Quadrature points of the rank's cells or of the facets of a part, and the load vector of data given there.
+template <int d>
+class LoadQuadrature {
+ public:
+  /// Volume when `part` is empty. `points` per direction (exact to degree 2 points - 1).
+  LoadQuadrature(const Layout<d>& layout, const std::optional<std::string>& part, int points);
+
+  RealTable<d> positions() const { return positions_; }  ///< (points, d)
+  /// int f . v with f (points, components) of block size `components`.
+  VecHandle load(const RealTable<Eigen::Dynamic>& values) const;
+  /// Squared L2 distance of the P1 function `field` to `values`, summed over the ranks.
+  double squared_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const;
+  /// Squared distance of eps(field) to the symmetric part of the gradients `values` (points, d*d), d/dx_j of component i at i*d+j.
+  double squared_strain_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const;
+
+ private:
+  const Layout<d>& layout_;
+  Rule rule_;
+  RealTable<d> positions_;
+  IndexTable<Eigen::Dynamic> nodes_;   // local nodes of every cell or facet
+  std::vector<Eigen::Index> cells_;    // local cell of every cell or facet
+  Eigen::VectorXd measures_;
+};
+
+/// |v|_L2 of a P1 function of any block size, exact.
+template <int d>
+double norm_l2(const Layout<d>& layout, Vec v);
+/// |v|_V = |eps(v)|_L2 of a P1 displacement, exact.
+template <int d>
+double norm_v(const Layout<d>& layout, Vec v);
+
+}  // namespace warmslip

@@ -1,0 +1,68 @@
+// Owning handles for PETSc objects, and its error codes as exceptions.
+#pragma once
+#include <petscksp.h>
+
+#include <Eigen/Dense>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace warmslip {
+
+/// A PETSc call that failed; `code` is PETSc's.
+struct PetscFailure : std::runtime_error {
+  PetscFailure(int petsc_code, const std::string& where);
+  int code;
+};
+
+/// Throws PetscFailure unless `error` is success.
+void check(PetscErrorCode error, const char* where);
+#define WARMSLIP_PETSC(call) ::warmslip::check((call), #call)
+
+template <class T, auto destroy>
+class Handle {
+ public:
+  Handle() = default;
+  explicit Handle(T object) : object_(object) {}
+  Handle(Handle&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(object_, other.object_);
+    return *this;
+  }
+  ~Handle() {
+    if (object_) destroy(&object_);
+  }
+  operator T() const { return object_; }
+  /// For PETSc's creating functions.
+  T* out() { return &object_; }
+
+ private:
+  T object_ = nullptr;
+};
+
+using VecHandle = Handle<Vec, VecDestroy>;
+using MatHandle = Handle<Mat, MatDestroy>;
+using KspHandle = Handle<KSP, KSPDestroy>;
+using IsHandle = Handle<IS, ISDestroy>;
+using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
+
+/// A copy of the layout of `like`, not of its values.
+VecHandle duplicate(Vec like);
+
+/// A view of a vector's own entries as an Eigen array, for reading or writing; returned to PETSc on destruction.
+class Values {
+ public:
+  explicit Values(Vec vec);
+  Values(const Values&) = delete;
+  ~Values();
+  Eigen::Map<Eigen::VectorXd> operator*() { return {data_, size_}; }
+
+ private:
+  Vec vec_;
+  double* data_ = nullptr;
+  PetscInt size_ = 0;
+};
+
+}  // namespace warmslip

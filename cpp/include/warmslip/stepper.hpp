@@ -1,0 +1,95 @@
+// Backward Euler for problem (PF): one verb, advance().
+#pragma once
+#include "warmslip/contact_solver.hpp"
+#include "warmslip/factor.hpp"
+#include "warmslip/ledger.hpp"
+
+namespace warmslip {
+
+/// Which time level the coupling terms take: (theta_{n-1}, w_n), (theta_{n-1}, w_{n-1}) or (theta_n, w_n).
+enum class Coupling { staggered, lagged, monolithic };
+
+enum class Outcome { right, contact_not_converged, not_finite };
+
+struct StepperOptions {
+  double k;                              ///< time step
+  Coupling coupling;
+  Backend backend = Backend::automatic;
+  ContactOptions contact{};
+};
+
+/// Load vectors of one step: `force` (f, v), `heat` (q, eta) with k_c theta_F on Gamma_C included, `gap` g (points).
+struct StepLoads {
+  Vec force, heat;
+  Eigen::VectorXd gap;
+};
+
+template <int d>
+struct StepReport {
+  Outcome outcome = Outcome::right;
+  Stage stage = Stage::none;
+  int newton_iterations = 0;
+  int open = 0, stick = 0, slip = 0;
+  double max_penetration = 0;                      ///< length
+  double normal_force = 0;                         ///< int p_nu, force
+  Point<d> traction = Point<d>::Zero();            ///< int sigma nu over Gamma_C: the foundation's force on the body
+  Point<d> friction_traction = Point<d>::Zero();   ///< its tangential part
+  Ledger ledger{};
+};
+
+/// What a run costs, so far.
+struct Cost {
+  double setup_seconds = 0, step_seconds = 0;      ///< CPU of this process
+  double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0;  ///< parts of step_seconds
+  int steps = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0, newton_iterations = 0;
+  double factor_bytes = 0;
+};
+
+template <int d>
+class Stepper {
+ public:
+  /// Factors the operators of `problem` for the step size of `options`.
+  Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+          const ContactSurface<d>& surface, StepperOptions options);
+
+  /// Sets the initial data (2.11); `gap` at the contact points.
+  void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
+  /// One step. When the outcome is not `right`, the state is the last good one.
+  StepReport<d> advance(const StepLoads& loads);
+
+  const Level& level() const { return now_; }
+  double time() const { return time_; }
+  int steps() const { return cost_.steps; }
+  const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
+  const std::vector<Status>& status() const { return status_; }
+  const Cost& cost() const { return cost_; }
+  Factor& momentum_factor() { return *momentum_; }
+  Factor* heat_factor() { return heat_.get(); }       ///< nullptr when monolithic
+  std::string solver() const;
+
+ private:
+  void momentum_right_side(const StepLoads& loads, Vec out);
+  void products(Level& level) const;
+  bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, ContactSolution<d>& solution);
+  void solve_heat(const StepLoads& loads, Vec heating_w, Vec theta);
+  void split(Vec coupled, Vec w, Vec theta) const;
+  void join(Vec momentum, Vec heat, Vec coupled) const;
+  static void zero(Vec v, const std::vector<PetscInt>& indices);
+
+  const Layout<d>& layout_;
+  const Problem<d>& problem_;
+  const Operators<d>& operators_;
+  const ContactSurface<d>& surface_;
+  StepperOptions options_;
+  double coupled_scale_ = 1;
+  std::unique_ptr<Factor> momentum_, heat_;   // monolithic: momentum_ holds both fields
+  std::unique_ptr<ContactSolver<d>> contact_;
+  Level now_, next_;
+  VecHandle momentum_right_, heat_right_, coupled_right_, coupled_;
+  Eigen::VectorXd contact_force_;
+  std::vector<Status> status_;
+  double time_ = 0;
+  Cost cost_;
+};
+
+}  // namespace warmslip

@@ -1,0 +1,128 @@
+#include "warmslip/contact_surface.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "warmslip/quadrature.hpp"
+
+namespace warmslip {
+namespace {
+
+template <int d>
+std::set<Index> nodes_of(const Mesh<d>& mesh, const std::vector<std::string>& parts) {
+  std::set<Index> nodes;
+  for (const auto& name : parts) {
+    const auto& facets = mesh.part(name);
+    nodes.insert(facets.nodes.data(), facets.nodes.data() + facets.nodes.size());
+  }
+  return nodes;
+}
+
+}  // namespace
+
+template <int d>
+ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem)
+    : layout_(layout), nodal_(problem.quadrature.points == 0) {
+  const Mesh<d>& mesh = layout.mesh();
+  const Facets<d>& facets = mesh.part(problem.contact_part);
+  const std::set<Index> clamped = nodes_of(mesh, problem.clamped);
+  std::map<Index, Eigen::Index> number;
+  for (const Index node : nodes_of(mesh, {problem.contact_part}))
+    if (!clamped.contains(node)) {
+      number[node] = static_cast<Eigen::Index>(nodes_.size());
+      nodes_.push_back(node);
+    }
+
+  std::vector<Point<d>> positions, normals;
+  std::vector<double> weights;
+  std::vector<Eigen::Triplet<double>> shape;
+  std::map<Index, std::vector<std::size_t>> at_node;  // vertex rule: points that differ in normal only stay apart
+  const auto add_shape = [&](std::size_t point, Index node, double value) {
+    if (const auto found = number.find(node); found != number.end())
+      for (int a = 0; a < d; ++a) shape.emplace_back(static_cast<int>(point) * d + a, static_cast<int>(found->second) * d + a, value);
+  };
+  const auto new_point = [&](const Point<d>& x, const Point<d>& nu, double weight) {
+    positions.push_back(x);
+    normals.push_back(nu);
+    weights.push_back(weight);
+    return weights.size() - 1;
+  };
+  const Rule rule = simplex_rule(d - 1, nodal_ ? 1 : problem.quadrature.points);
+  for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+    const Point<d> area = area_normal(mesh, facets, f), nu = area.normalized();
+    if (nodal_) {
+      for (int i = 0; i < d; ++i) {
+        const Index node = facets.nodes(f, i);
+        if (!number.contains(node)) continue;
+        auto& here = at_node[node];
+        const auto same = std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
+        if (same != here.end()) {
+          weights[*same] += area.norm() / d;
+        } else {
+          here.push_back(new_point(mesh.nodes.row(node).transpose(), nu, area.norm() / d));
+          add_shape(here.back(), node, 1);
+        }
+      }
+    } else {
+      for (Eigen::Index q = 0; q < rule.weights.size(); ++q) {
+        Point<d> x = Point<d>::Zero();
+        for (int i = 0; i < d; ++i) x += rule.barycentric(q, i) * mesh.nodes.row(facets.nodes(f, i)).transpose();
+        const std::size_t point = new_point(x, nu, area.norm() * rule.weights[q]);
+        for (int i = 0; i < d; ++i) add_shape(point, facets.nodes(f, i), rule.barycentric(q, i));
+      }
+    }
+  }
+  const auto count = static_cast<Eigen::Index>(weights.size());
+  weights_ = Eigen::Map<Eigen::VectorXd>(weights.data(), count);
+  positions_.resize(count, d);
+  normals_.resize(count, d);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    positions_.row(i) = positions[static_cast<std::size_t>(i)].transpose();
+    normals_.row(i) = normals[static_cast<std::size_t>(i)].transpose();
+  }
+  shape_.resize(count * d, nodes() * d);
+  shape_.setFromTriplets(shape.begin(), shape.end());
+}
+
+template <int d>
+std::vector<PetscInt> ContactSurface<d>::unknowns(int block) const {
+  std::vector<PetscInt> indices;
+  for (const Index node : nodes_)
+    for (int a = 0; a < d; ++a) indices.push_back(layout_.global_of(node) * block + a);
+  return indices;
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::nodal_values(Vec v) const {
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
+  const auto indices = unknowns(d);
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(indices.size()));
+  {
+    Values own(v);
+    for (std::size_t i = 0; i < indices.size(); ++i)
+      if (indices[i] >= begin && indices[i] < end) values[static_cast<Eigen::Index>(i)] = (*own)[indices[i] - begin];
+  }
+  return layout_.sum(std::move(values));
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::at_points(const Eigen::VectorXd& nodal) const {
+  return shape_ * nodal;
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const {
+  return shape_.transpose() * forces;
+}
+
+template <int d>
+Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) const {
+  const Eigen::MatrixXd half = shape_ * compliance;
+  return half * shape_.transpose();
+}
+
+template class ContactSurface<2>;
+template class ContactSurface<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,236 @@
+#include "warmslip/factor_backends.hpp"
+
+#ifndef WARMSLIP_HAVE_CHOLMOD
+namespace warmslip {
+std::unique_ptr<Factor> factor_with_cholmod(Mat, const std::vector<PetscInt>&, Symmetry, int) { return nullptr; }
+}  // namespace warmslip
+#else
+#include <suitesparse/cholmod.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace warmslip {
+namespace {
+
+// The upper triangle of a sequential AIJ matrix, rows in place of columns, as CHOLMOD reads the lower one.
+struct Triangle {
+  explicit Triangle(Mat k) {
+    PetscInt n;
+    const PetscInt *rows, *cols;
+    PetscBool done;
+    const PetscScalar* entries;
+    WARMSLIP_PETSC(MatGetRowIJ(k, 0, PETSC_FALSE, PETSC_FALSE, &n, &rows, &cols, &done));
+    if (!done) throw std::logic_error("the CHOLMOD backend needs an assembled AIJ matrix");
+    WARMSLIP_PETSC(MatSeqAIJGetArrayRead(k, &entries));
+    start.reserve(static_cast<std::size_t>(n) + 1);
+    for (PetscInt i = 0; i < n; ++i) {
+      start.push_back(static_cast<int>(index.size()));
+      for (PetscInt e = rows[i]; e < rows[i + 1]; ++e)
+        if (cols[e] >= i && (entries[e] != 0 || cols[e] == i)) {
+          index.push_back(static_cast<int>(cols[e]));
+          value.push_back(entries[e]);
+        }
+    }
+    start.push_back(static_cast<int>(index.size()));
+    WARMSLIP_PETSC(MatSeqAIJRestoreArrayRead(k, &entries));
+    WARMSLIP_PETSC(MatRestoreRowIJ(k, 0, PETSC_FALSE, PETSC_FALSE, &n, &rows, &cols, &done));
+  }
+  std::vector<int> start, index;
+  std::vector<double> value;
+};
+
+cholmod_sparse view(std::vector<int>& start, std::vector<int>& index, double* value) {
+  cholmod_sparse a{};
+  a.nrow = a.ncol = start.size() - 1;
+  a.nzmax = index.size();
+  a.p = start.data();
+  a.i = index.data();
+  a.x = value;
+  a.stype = -1;
+  a.itype = CHOLMOD_INT;
+  a.xtype = value ? CHOLMOD_REAL : CHOLMOD_PATTERN;
+  a.dtype = CHOLMOD_DOUBLE;
+  a.sorted = 1;
+  a.packed = 1;
+  return a;
+}
+
+class CholmodFactor final : public Factor {
+ public:
+  CholmodFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block) {
+    cholmod_start(&common_);
+    common_.print = 0;
+    Triangle triangle(k);
+    const auto n = triangle.start.size() - 1;
+    permutation_ = ordering(triangle, trailing, static_cast<int>(n), block);
+    held_ = static_cast<Eigen::Index>(trailing.size());
+    interior_ = static_cast<Eigen::Index>(n) - held_;
+
+    cholmod_sparse a = view(triangle.start, triangle.index, triangle.value.data());
+    common_.nmethods = 1;
+    common_.method[0].ordering = CHOLMOD_GIVEN;
+    common_.postorder = 0;  // it would move the trailing unknowns
+    // Factor with dense blocks, substitute without: a single right-hand side is quicker on the plain columns. A symmetric
+    // matrix that may be indefinite (quasi-definite) needs L D L^T, which only the plain form has.
+    const bool definite = symmetry == Symmetry::positive_definite;
+    common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
+    factor_ = cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_);
+    usable_ = factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
+    usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_, &common_);
+    if (!usable_) return;
+    common_.final_ll = 0;
+    right_ = cholmod_zeros(n, 1, CHOLMOD_REAL, &common_);
+    half_ = cholmod_zeros(n, 1, CHOLMOD_REAL, &common_);
+    last_block();
+    usable_ = accurate(k);
+    substitutions_ = 0;
+  }
+
+  ~CholmodFactor() override {
+    for (cholmod_dense** x : {&right_, &half_, &out_, &work_, &extra_}) cholmod_free_dense(x, &common_);
+    if (factor_) cholmod_free_factor(&factor_, &common_);
+    cholmod_finish(&common_);
+  }
+
+  bool usable() const { return usable_; }
+
+  Eigen::VectorXd reduce(Vec r) override {
+    {
+      Values values(r);
+      double* x = static_cast<double*>(right_->x);
+      for (std::size_t i = 0; i < permutation_.size(); ++i) x[i] = (*values)[permutation_[i]];
+    }
+    sweep(CHOLMOD_L, right_, half_);
+    ++substitutions_;
+    return last_.transpose().triangularView<Eigen::UnitUpper>().solve(tail().cwiseQuotient(pivots_));
+  }
+
+  void expand(const Eigen::VectorXd& load, Vec x) override {
+    if (held_ > 0) tail() -= last_.triangularView<Eigen::UnitLower>().solve(load);
+    sweep(CHOLMOD_DLt, half_, out_);
+    Values values(x);
+    const double* from = static_cast<const double*>(out_->x);
+    for (std::size_t i = 0; i < permutation_.size(); ++i) (*values)[permutation_[i]] = from[i];
+  }
+
+  const Eigen::MatrixXd& compliance() override {
+    if (compliance_.rows() == held_) return compliance_;
+    Eigen::MatrixXd inverse = last_.triangularView<Eigen::UnitLower>().solve(Eigen::MatrixXd::Identity(held_, held_));
+    compliance_.noalias() = inverse.transpose() * pivots_.cwiseInverse().asDiagonal() * inverse;
+    return compliance_;
+  }
+
+  double bytes() const override { return 12.0 * static_cast<double>(factor_->nzmax); }
+  std::string description() const override {
+    return std::string("CHOLMOD L D L^T, ") + (metis_ ? "METIS" : "AMD") + " ordering, contact unknowns last";
+  }
+
+ private:
+  Eigen::Map<Eigen::VectorXd> tail() { return {static_cast<double*>(half_->x) + interior_, held_}; }
+
+  // Isolated (clamped) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing ones.
+  std::vector<int> ordering(const Triangle& a, const std::vector<PetscInt>& trailing, int n, int block) {
+    std::vector<bool> last(static_cast<std::size_t>(n), false);
+    for (const PetscInt i : trailing) last[static_cast<std::size_t>(i)] = true;
+    const int nodes = n / block;
+    std::vector<bool> touches(static_cast<std::size_t>(nodes), false);
+    for (const PetscInt i : trailing) touches[static_cast<std::size_t>(i / block)] = true;
+    std::vector<int> number(static_cast<std::size_t>(nodes), -1), interior;
+    for (int i = 0; i < nodes; ++i)
+      if (!touches[static_cast<std::size_t>(i)]) {
+        number[static_cast<std::size_t>(i)] = static_cast<int>(interior.size());
+        interior.push_back(i);
+      }
+    std::vector<int> start{0}, index, row;
+    for (const int node : interior) {
+      row.clear();
+      for (int i = node * block; i < (node + 1) * block; ++i)
+        for (int e = a.start[static_cast<std::size_t>(i)]; e < a.start[static_cast<std::size_t>(i) + 1]; ++e) {
+          const int other = number[static_cast<std::size_t>(a.index[static_cast<std::size_t>(e)] / block)];
+          if (other >= 0) row.push_back(other);
+        }
+      row.push_back(number[static_cast<std::size_t>(node)]);
+      std::sort(row.begin(), row.end());
+      row.erase(std::unique(row.begin(), row.end()), row.end());
+      index.insert(index.end(), row.begin(), row.end());
+      start.push_back(static_cast<int>(index.size()));
+    }
+    std::vector<int> order(interior.size());
+    if (!interior.empty()) {
+      cholmod_sparse graph = view(start, index, nullptr);
+      metis_ = cholmod_metis(&graph, nullptr, 0, 1, order.data(), &common_) && common_.status == CHOLMOD_OK;
+      if (!metis_) cholmod_amd(&graph, nullptr, 0, order.data(), &common_);
+    }
+    std::vector<int> permutation;
+    for (const int o : order)
+      for (int c = 0; c < block; ++c) permutation.push_back(interior[static_cast<std::size_t>(o)] * block + c);
+    for (int i = 0; i < n; ++i)
+      if (touches[static_cast<std::size_t>(i / block)] && !last[static_cast<std::size_t>(i)]) permutation.push_back(i);
+    for (const PetscInt i : trailing) permutation.push_back(static_cast<int>(i));
+    return permutation;
+  }
+
+  // The dense last block L_cc and its pivots: S = L_cc D_cc L_cc^T is the Schur complement of the trailing unknowns.
+  void last_block() {
+    last_ = Eigen::MatrixXd::Identity(held_, held_);
+    pivots_.resize(held_);
+    const int* start = static_cast<const int*>(factor_->p);
+    const int* count = static_cast<const int*>(factor_->nz);
+    const int* index = static_cast<const int*>(factor_->i);
+    const double* value = static_cast<const double*>(factor_->x);
+    for (Eigen::Index j = 0; j < held_; ++j) {
+      const auto column = interior_ + j;
+      for (int e = start[column]; e < start[column] + count[column]; ++e) {
+        if (index[e] == column) pivots_[j] = value[e];
+        else last_(index[e] - interior_, j) = value[e];
+      }
+    }
+  }
+
+  // One honest solve: without pivoting an indefinite matrix may lose digits.
+  bool accurate(Mat k) {
+    VecHandle b, x;
+    WARMSLIP_PETSC(MatCreateVecs(k, x.out(), b.out()));
+    {
+      Values values(b);
+      for (Eigen::Index i = 0; i < (*values).size(); ++i) (*values)[i] = 1 + (i * 7 % 11);
+    }
+    const VecHandle residual = duplicate(b);
+    reduce(b);
+    expand(Eigen::VectorXd::Zero(held_), x);
+    PetscReal size, error, factor_size, solution;
+    WARMSLIP_PETSC(MatMult(k, x, residual));
+    WARMSLIP_PETSC(VecAXPY(residual, -1, b));
+    WARMSLIP_PETSC(VecNorm(b, NORM_INFINITY, &size));
+    WARMSLIP_PETSC(VecNorm(x, NORM_INFINITY, &solution));
+    WARMSLIP_PETSC(MatNorm(k, NORM_INFINITY, &factor_size));
+    WARMSLIP_PETSC(VecNorm(residual, NORM_INFINITY, &error));
+    return error <= 1e-12 * (size + factor_size * solution);
+  }
+
+  void sweep(int system, cholmod_dense* from, cholmod_dense*& to) {
+    if (!cholmod_solve2(system, factor_, from, nullptr, &to, nullptr, &work_, &extra_, &common_))
+      throw std::runtime_error("CHOLMOD ran out of memory in a substitution");
+  }
+
+  cholmod_common common_{};
+  cholmod_factor* factor_ = nullptr;
+  cholmod_dense *right_ = nullptr, *half_ = nullptr, *out_ = nullptr, *work_ = nullptr, *extra_ = nullptr;
+  std::vector<int> permutation_;
+  Eigen::Index held_ = 0, interior_ = 0;
+  Eigen::MatrixXd last_, compliance_;
+  Eigen::VectorXd pivots_;
+  bool usable_ = false, metis_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Factor> factor_with_cholmod(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block) {
+  auto factor = std::make_unique<CholmodFactor>(k, trailing, symmetry, block);
+  if (!factor->usable()) return nullptr;
+  return factor;
+}
+
+}  // namespace warmslip
+#endif

@@ -1,0 +1,115 @@
+#include "warmslip/factor_backends.hpp"
+
+namespace warmslip {
+namespace {
+
+class PetscFactor final : public Factor {
+ public:
+  PetscFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix) {
+    const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(k));
+    const bool cholesky = symmetry == Symmetry::positive_definite;
+    WARMSLIP_PETSC(KSPCreate(comm, ksp_.out()));
+    WARMSLIP_PETSC(KSPSetOptionsPrefix(ksp_, (prefix + "_").c_str()));
+    WARMSLIP_PETSC(KSPSetOperators(ksp_, k, k));
+    WARMSLIP_PETSC(KSPSetType(ksp_, KSPPREONLY));
+    WARMSLIP_PETSC(MatSetOption(k, MAT_SYMMETRIC, symmetry == Symmetry::general ? PETSC_FALSE : PETSC_TRUE));
+    if (cholesky) WARMSLIP_PETSC(MatSetOption(k, MAT_SPD, PETSC_TRUE));
+    PC pc;
+    WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
+    WARMSLIP_PETSC(PCSetType(pc, cholesky ? PCCHOLESKY : PCLU));
+    WARMSLIP_PETSC(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+    WARMSLIP_PETSC(KSPSetFromOptions(ksp_));
+    WARMSLIP_PETSC(KSPSetErrorIfNotConverged(ksp_, PETSC_TRUE));
+    WARMSLIP_PETSC(KSPSetUp(ksp_));
+    WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
+    work_ = duplicate(right_);
+
+    WARMSLIP_PETSC(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(trailing.size()), trailing.data(), PETSC_COPY_VALUES, indices_.out()));
+    WARMSLIP_PETSC(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(trailing.size()), held_.out()));
+    WARMSLIP_PETSC(VecScatterCreate(free_, indices_, held_, nullptr, scatter_.out()));
+    trailing_ = trailing;
+  }
+
+  Eigen::VectorXd reduce(Vec r) override {
+    WARMSLIP_PETSC(VecCopy(r, right_));
+    WARMSLIP_PETSC(KSPSolve(ksp_, right_, free_));
+    ++substitutions_;
+    return held(free_);
+  }
+
+  void expand(const Eigen::VectorXd& load, Vec x) override {
+    if (load.size() == 0 || load.isZero(0)) {
+      WARMSLIP_PETSC(VecCopy(free_, x));
+      return;
+    }
+    add_load(load);
+    WARMSLIP_PETSC(KSPSolve(ksp_, work_, x));
+    ++substitutions_;
+    WARMSLIP_PETSC(VecAYPX(x, -1, free_));
+  }
+
+  const Eigen::MatrixXd& compliance() override {
+    const auto n = static_cast<Eigen::Index>(trailing_.size());
+    if (compliance_.rows() == n) return compliance_;
+    compliance_.resize(n, n);
+    const VecHandle column = duplicate(free_);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      add_load(Eigen::VectorXd::Unit(n, j));
+      WARMSLIP_PETSC(KSPSolve(ksp_, work_, column));
+      ++substitutions_;
+      compliance_.col(j) = held(column);
+    }
+    return compliance_;
+  }
+
+  double bytes() const override {
+    PC pc;
+    Mat factored;
+    MatInfo info;
+    WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
+    WARMSLIP_PETSC(PCFactorGetMatrix(pc, &factored));
+    WARMSLIP_PETSC(MatGetInfo(factored, MAT_LOCAL, &info));
+    return 12 * info.nz_used;
+  }
+
+  std::string description() const override {
+    PC pc;
+    PCType type;
+    MatSolverType package;
+    WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
+    WARMSLIP_PETSC(PCGetType(pc, &type));
+    WARMSLIP_PETSC(PCFactorGetMatSolverType(pc, &package));
+    return std::string("PETSc ") + type + " by " + (package ? package : "petsc");
+  }
+
+ private:
+  Eigen::VectorXd held(Vec from) {
+    WARMSLIP_PETSC(VecScatterBegin(scatter_, from, held_, INSERT_VALUES, SCATTER_FORWARD));
+    WARMSLIP_PETSC(VecScatterEnd(scatter_, from, held_, INSERT_VALUES, SCATTER_FORWARD));
+    return *Values(held_);
+  }
+
+  void add_load(const Eigen::VectorXd& load) {
+    PetscInt begin, end;
+    WARMSLIP_PETSC(VecGetOwnershipRange(work_, &begin, &end));
+    WARMSLIP_PETSC(VecSet(work_, 0));
+    Values values(work_);
+    for (std::size_t i = 0; i < trailing_.size(); ++i)
+      if (trailing_[i] >= begin && trailing_[i] < end) (*values)[trailing_[i] - begin] = load[static_cast<Eigen::Index>(i)];
+  }
+
+  KspHandle ksp_;
+  VecHandle right_, free_, work_, held_;
+  IsHandle indices_;
+  ScatterHandle scatter_;
+  std::vector<PetscInt> trailing_;
+  Eigen::MatrixXd compliance_;
+};
+
+}  // namespace
+
+std::unique_ptr<Factor> factor_with_petsc(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix) {
+  return std::make_unique<PetscFactor>(k, trailing, symmetry, prefix);
+}
+
+}  // namespace warmslip

@@ -1,0 +1,141 @@
+// Load vectors, exact norms and distances to given functions: everything that integrates over a mesh.
+#include "warmslip/element.hpp"
+#include "warmslip/operators.hpp"
+
+namespace warmslip {
+
+template <int d>
+LoadQuadrature<d>::LoadQuadrature(const Layout<d>& layout, const std::optional<std::string>& part, int points)
+    : layout_(layout), rule_(simplex_rule(part ? d - 1 : d, points)) {
+  const Mesh<d>& mesh = layout.mesh();
+  std::vector<double> measures;
+  if (part) {
+    const Facets<d>& facets = mesh.part(*part);
+    std::vector<Eigen::Index> mine;
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f)
+      if (layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) mine.push_back(f);
+    nodes_.resize(static_cast<Eigen::Index>(mine.size()), d);
+    for (std::size_t f = 0; f < mine.size(); ++f) {
+      const Eigen::Index cell = layout.local_cell(facets.cells[static_cast<std::size_t>(mine[f])]);
+      cells_.push_back(cell);
+      measures.push_back(area_normal(mesh, facets, mine[f]).norm());
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j <= d; ++j) {  // the local number of the facet's node, through its cell
+          const Index local = layout.local_cells()(cell, j);
+          if (layout.mesh_nodes()[static_cast<std::size_t>(local)] == facets.nodes(mine[f], i)) nodes_(static_cast<Eigen::Index>(f), i) = local;
+        }
+    }
+  } else {
+    nodes_ = layout.local_cells();
+    for (Eigen::Index c = 0; c < layout.cells(); ++c) {
+      cells_.push_back(c);
+      measures.push_back(simplex<d>(vertices(mesh, layout.mesh_cells()[static_cast<std::size_t>(c)])).volume);
+    }
+  }
+  measures_ = Eigen::Map<Eigen::VectorXd>(measures.data(), static_cast<Eigen::Index>(measures.size()));
+  const Eigen::Index per = rule_.weights.size();
+  positions_.setZero(nodes_.rows() * per, d);
+  for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
+    for (Eigen::Index q = 0; q < per; ++q)
+      for (Eigen::Index i = 0; i < nodes_.cols(); ++i)
+        positions_.row(s * per + q) += rule_.barycentric(q, i) * mesh.nodes.row(layout.mesh_nodes()[static_cast<std::size_t>(nodes_(s, i))]);
+}
+
+template <int d>
+VecHandle LoadQuadrature<d>::load(const RealTable<Eigen::Dynamic>& values) const {
+  if (values.rows() != positions_.rows())
+    throw std::invalid_argument("a load needs one row for each of the " + std::to_string(positions_.rows()) +
+                                " quadrature points, got " + std::to_string(values.rows()));
+  const int block = static_cast<int>(values.cols());
+  VecHandle v = layout_.vector(block);
+  const Eigen::Index per = rule_.weights.size();
+  Vec form;
+  WARMSLIP_PETSC(VecGhostGetLocalForm(v, &form));
+  {
+    Values entries(form);
+    for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
+      for (Eigen::Index q = 0; q < per; ++q)
+        for (Eigen::Index i = 0; i < nodes_.cols(); ++i)
+          (*entries).segment(nodes_(s, i) * block, block) +=
+              measures_[s] * rule_.weights[q] * rule_.barycentric(q, i) * values.row(s * per + q).transpose();
+  }
+  WARMSLIP_PETSC(VecGhostRestoreLocalForm(v, &form));
+  WARMSLIP_PETSC(VecGhostUpdateBegin(v, ADD_VALUES, SCATTER_REVERSE));
+  WARMSLIP_PETSC(VecGhostUpdateEnd(v, ADD_VALUES, SCATTER_REVERSE));
+  return v;
+}
+
+template <int d>
+double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
+  const Eigen::VectorXd local = layout_.local(field);
+  const auto block = static_cast<int>(values.cols());
+  const Eigen::Index per = rule_.weights.size();
+  double total = 0;
+  for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
+    for (Eigen::Index q = 0; q < per; ++q) {
+      Eigen::VectorXd difference = -values.row(s * per + q).transpose();
+      for (Eigen::Index i = 0; i < nodes_.cols(); ++i) difference += rule_.barycentric(q, i) * local.segment(nodes_(s, i) * block, block);
+      total += measures_[s] * rule_.weights[q] * difference.squaredNorm();
+    }
+  return layout_.sum(total);
+}
+
+template <int d>
+double LoadQuadrature<d>::squared_strain_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
+  const Eigen::VectorXd local = layout_.local(field);
+  const Eigen::Index per = rule_.weights.size();
+  double total = 0;
+  for (Eigen::Index s = 0; s < nodes_.rows(); ++s) {
+    const Eigen::Index cell = cells_[static_cast<std::size_t>(s)];
+    const Simplex<d> shape = simplex<d>(vertices(layout_.mesh(), layout_.mesh_cells()[static_cast<std::size_t>(cell)]));
+    Eigen::Matrix<double, d*(d + 1), 1> nodal;
+    for (int i = 0; i <= d; ++i) nodal.template segment<d>(i * d) = local.segment<d>(layout_.local_cells()(cell, i) * d);
+    const Mandel<d> strain = strain_matrix<d>(shape) * nodal;
+    for (Eigen::Index q = 0; q < per; ++q) {
+      Tensor2<d> gradient;
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j < d; ++j) gradient(i, j) = values(s * per + q, i * d + j);
+      total += measures_[s] * rule_.weights[q] * (strain - to_mandel<d>(gradient)).squaredNorm();
+    }
+  }
+  return layout_.sum(total);
+}
+
+template <int d>
+double norm_l2(const Layout<d>& layout, Vec v) {
+  PetscInt block;
+  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::VectorXd local = layout.local(v);
+  double total = 0;
+  for (Eigen::Index c = 0; c < layout.cells(); ++c) {
+    const double volume = simplex<d>(vertices(layout.mesh(), layout.mesh_cells()[static_cast<std::size_t>(c)])).volume;
+    for (int a = 0; a < block; ++a) {
+      Eigen::Matrix<double, d + 1, 1> nodal;
+      for (int i = 0; i <= d; ++i) nodal[i] = local[layout.local_cells()(c, i) * block + a];
+      total += volume / ((d + 1) * (d + 2)) * (nodal.squaredNorm() + nodal.sum() * nodal.sum());
+    }
+  }
+  return std::sqrt(layout.sum(total));
+}
+
+template <int d>
+double norm_v(const Layout<d>& layout, Vec v) {
+  const Eigen::VectorXd local = layout.local(v);
+  double total = 0;
+  for (Eigen::Index c = 0; c < layout.cells(); ++c) {
+    const Simplex<d> s = simplex<d>(vertices(layout.mesh(), layout.mesh_cells()[static_cast<std::size_t>(c)]));
+    Eigen::Matrix<double, d, d + 1> nodal;
+    for (int i = 0; i <= d; ++i) nodal.col(i) = local.segment<d>(layout.local_cells()(c, i) * d);
+    total += s.volume * to_mandel<d>(nodal * s.gradients).squaredNorm();
+  }
+  return std::sqrt(layout.sum(total));
+}
+
+#define WARMSLIP_INSTANTIATE(d)                          \
+  template class LoadQuadrature<d>;                      \
+  template double norm_l2<d>(const Layout<d>&, Vec);     \
+  template double norm_v<d>(const Layout<d>&, Vec);
+WARMSLIP_INSTANTIATE(2)
+WARMSLIP_INSTANTIATE(3)
+
+}  // namespace warmslip

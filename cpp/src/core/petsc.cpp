@@ -1,0 +1,26 @@
+#include "warmslip/petsc.hpp"
+
+namespace warmslip {
+
+PetscFailure::PetscFailure(int petsc_code, const std::string& where)
+    : std::runtime_error("PETSc error " + std::to_string(petsc_code) + " in " + where), code(petsc_code) {}
+
+void check(PetscErrorCode error, const char* where) {
+  if (error) throw PetscFailure(static_cast<int>(error), where);
+}
+
+VecHandle duplicate(Vec like) {
+  VecHandle v;
+  WARMSLIP_PETSC(VecDuplicate(like, v.out()));
+  WARMSLIP_PETSC(VecSet(v, 0));
+  return v;
+}
+
+Values::Values(Vec vec) : vec_(vec) {
+  WARMSLIP_PETSC(VecGetLocalSize(vec, &size_));
+  WARMSLIP_PETSC(VecGetArray(vec, &data_));
+}
+
+Values::~Values() { VecRestoreArray(vec_, &data_); }
+
+}  // namespace warmslip

@@ -1,0 +1,242 @@
+#include "warmslip/contact_solver.hpp"
+
+#include <limits>
+#include <set>
+#include <stdexcept>
+
+namespace warmslip {
+
+template <int d>
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity, double* floor) {
+  constexpr double eps = std::numeric_limits<double>::epsilon();
+  const double mu = problem.law.friction.coefficient;
+  double largest = 0, fastest = 0, rounding = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto& point = problem.points[i];
+    const auto at = static_cast<Eigen::Index>(i) * d;
+    const double r = point.penetration + problem.step * velocity.template segment<d>(at).dot(point.normal);
+    largest = std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
+    fastest = std::max({fastest, problem.free.template segment<d>(at).norm(), velocity.template segment<d>(at).norm()});
+    const double terms = point.displacement.norm() + std::abs(point.gap) + problem.step * velocity.template segment<d>(at).norm();
+    rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
+  }
+  *floor = largest > 0 ? rounding / largest : 0;
+  if (largest == 0) return 0;
+  if (!std::isfinite(largest) || !std::isfinite(fastest)) return std::numeric_limits<double>::infinity();
+  const double bound_scale = mu > 0 ? mu * largest : largest;
+  double worst = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto& point = problem.points[i];
+    const auto at = static_cast<Eigen::Index>(i) * d;
+    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
+    const double r = point.penetration + problem.step * w.dot(point.normal);
+    const Point<d> f_tau = f - f.dot(point.normal) * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
+    const double bound = point.weight * problem.law.bound(r);
+    worst = std::max({worst, std::abs(f.dot(point.normal) - point.weight * problem.law.compliance.pressure(r)) / largest,
+                      (f_tau.norm() - bound) / bound_scale,
+                      fastest > 0 ? (bound * w_tau.norm() - f_tau.dot(w_tau)) / (bound_scale * fastest) : 0.0});
+  }
+  return worst;
+}
+
+template <int d>
+struct ContactSolver<d>::Linearisation {
+  Eigen::VectorXd velocity, value;
+  std::vector<PointResidual<d>> points;
+  std::vector<int> key;  // what the tangent depends on
+};
+
+template <int d>
+ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions options)
+    : compliance_(std::move(compliance)), options_(options) {
+  if (compliance_.rows() != compliance_.cols() || compliance_.rows() % d != 0)
+    throw std::invalid_argument("the compliance must be square with d rows a contact point");
+  spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
+}
+
+template <int d>
+typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& force) const {
+  Linearisation at;
+  at.velocity = problem.free;
+  at.velocity.noalias() -= compliance_ * force;
+  at.value.resize(force.size());
+  const double stiffness = problem.law.compliance.stiffness;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i) * d;
+    const Tensor2<d> own = compliance_.template block<d, d>(row, row);
+    const Point<d>& nu = problem.points[i].normal;
+    const double normal = nu.dot(own * nu);
+    // rows in units of force, of order one in the force whatever the stiffness
+    const double alpha = 1 / (1 + problem.points[i].weight * stiffness * problem.step * normal);
+    const double beta = (d - 1) / std::max(own.trace() - normal, 1e-300);
+    at.points.push_back(residual<d>(problem.law, problem.points[i], problem.step, alpha, beta, force.template segment<d>(row),
+                                    at.velocity.template segment<d>(row)));
+    at.value.template segment<d>(row) = at.points.back().value;
+    at.key.push_back(static_cast<int>(at.points.back().status) * 10 + at.points.back().slip_sign);
+  }
+  return at;
+}
+
+template <int d>
+void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
+  if (d == 2 && at.key == factored_) return;  // piecewise linear laws: same statuses, same tangent
+  Eigen::MatrixXd tangent(compliance_.rows(), compliance_.cols());
+  for (std::size_t i = 0; i < at.points.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i) * d;
+    tangent.template middleRows<d>(row).noalias() = -at.points[i].by_velocity * compliance_.template middleRows<d>(row);
+    tangent.template block<d, d>(row, row) += at.points[i].by_force;
+    // Gauss points outnumber nodes: sticking ones share their force arbitrarily, and this picks the nearest share.
+    // The residual is untouched, so the answer is not regularised.
+    if (at.points[i].status == Status::stick && options_.proximal > 0) {
+      const Point<d>& nu = problem.points[i].normal;
+      tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - nu * nu.transpose());
+    }
+  }
+  tangent_.compute(tangent);
+  factored_ = at.key;
+  ++solution.factorizations;
+}
+
+template <int d>
+bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const {
+  solution.law_residual = law_residual(problem, solution.force, solution.velocity, &solution.floor);
+  return solution.law_residual <= options_.tolerance + solution.floor;
+}
+
+template <int d>
+bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
+  Linearisation at = linearise(problem, solution.force);
+  std::set<std::vector<int>> seen;
+  for (int step = 0;; ++step) {
+    solution.velocity = at.velocity;
+    if (accept(problem, solution)) break;
+    if (step == options_.newton_steps) return false;
+    // the same statuses once more, after others: an undamped iteration would cycle for ever
+    if (d == 2 && !line_search && at.key != factored_ && !seen.insert(at.key).second) return false;
+    factor(problem, at, solution);
+    const Eigen::VectorXd direction = -tangent_.solve(at.value);
+    if (!direction.allFinite()) return false;
+    ++solution.iterations;
+    const double before = at.value.norm();
+    double length = 1;
+    for (;; length /= 2) {
+      Linearisation next = linearise(problem, solution.force + length * direction);
+      if (!line_search || next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
+        solution.force += length * direction;
+        at = std::move(next);
+        break;
+      }
+    }
+  }
+  solution.status.clear();
+  for (const auto& point : at.points) solution.status.push_back(point.status);
+  return true;
+}
+
+// Thresholds frozen, the step is convex: minimise 1/2 l.C l - l.free plus the law's conjugate by accelerated proximal
+// gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
+template <int d>
+bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  const double rate = 1 / spectral_, k = problem.step, stiffness = problem.law.compliance.stiffness;
+  const auto prox = [&](const Eigen::VectorXd& z, const Eigen::VectorXd& bounds) {
+    Eigen::VectorXd out(z.size());
+    for (std::size_t i = 0; i < problem.points.size(); ++i) {
+      const auto& point = problem.points[i];
+      const auto row = static_cast<Eigen::Index>(i) * d;
+      const double zn = z.template segment<d>(row).dot(point.normal);
+      const double spring = point.weight * stiffness * k;
+      const double normal = spring > 0 ? std::max(0.0, (zn + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
+      Point<d> tangential = z.template segment<d>(row) - zn * point.normal;
+      const double bound = bounds[static_cast<Eigen::Index>(i)];
+      if (tangential.norm() > bound) tangential *= bound / tangential.norm();
+      out.template segment<d>(row) = normal * point.normal + tangential;
+    }
+    return out;
+  };
+  Eigen::VectorXd force = solution.force, momentum = force, bounds(static_cast<Eigen::Index>(problem.points.size()));
+  double inertia = 1;
+  for (int step = 0; step < options_.fixed_point_steps; ++step) {
+    if (step % 20 == 0) {
+      for (std::size_t i = 0; i < problem.points.size(); ++i)
+        bounds[static_cast<Eigen::Index>(i)] =
+            problem.law.friction.coefficient * std::max(0.0, force.template segment<d>(static_cast<Eigen::Index>(i) * d).dot(problem.points[i].normal));
+      momentum = force;
+      inertia = 1;
+    }
+    const Eigen::VectorXd next = prox(momentum + rate * (problem.free - compliance_ * momentum), bounds);
+    const double stronger = (1 + std::sqrt(1 + 4 * inertia * inertia)) / 2;
+    momentum = next + (inertia - 1) / stronger * (next - force);
+    force = next;
+    inertia = stronger;
+    if (step % 200 == 199) {
+      solution.force = force;
+      if (newton(problem, false, solution)) return true;
+    }
+  }
+  return false;
+}
+
+template <int d>
+bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  const auto count = problem.points.size();
+  if (d != 2 || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
+  const double k = problem.step, stiffness = problem.law.compliance.stiffness;
+  for (std::size_t code = 0, codes = std::size_t{1} << (2 * count); code < codes; ++code) {
+    Eigen::MatrixXd by_force = Eigen::MatrixXd::Zero(compliance_.rows(), compliance_.cols()), by_velocity = by_force;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(compliance_.rows());
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto row = static_cast<Eigen::Index>(i) * 2;
+      const auto& point = problem.points[i];
+      const Eigen::Vector2d nu = point.normal.template head<2>(), tau(-nu[1], nu[0]);
+      const auto choice = code >> (2 * i) & 3;  // 0 open, 1 stick, 2 and 3 slip
+      const double spring = choice == 0 ? 0 : point.weight * stiffness;
+      const double drag = choice < 2 ? 0 : (choice == 2 ? 1 : -1) * problem.law.friction.coefficient * spring;
+      by_force.block<1, 2>(row, row) = nu.transpose();
+      by_velocity.block<1, 2>(row, row) = -spring * k * nu.transpose();
+      right[row] = spring * point.penetration;
+      if (choice == 1) {
+        by_velocity.block<1, 2>(row + 1, row) = tau.transpose();
+      } else {
+        by_force.block<1, 2>(row + 1, row) = tau.transpose();
+        by_velocity.block<1, 2>(row + 1, row) = -drag * k * nu.transpose();
+        right[row + 1] = drag * point.penetration;
+      }
+    }
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(by_force - by_velocity * compliance_);
+    solution.force = lu.solve(right - by_velocity * problem.free);
+    if (!solution.force.allFinite()) continue;
+    const Linearisation at = linearise(problem, solution.force);
+    solution.velocity = at.velocity;
+    if (!accept(problem, solution)) continue;
+    solution.status.clear();
+    for (const auto& point : at.points) solution.status.push_back(point.status);
+    return true;
+  }
+  return false;
+}
+
+template <int d>
+ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
+  ContactSolution<d> solution;
+  solution.force = force;
+  solution.velocity = problem.free;
+  if (!problem.free.allFinite()) return solution;
+  const auto attempt = [&](Stage stage, auto&& method) {
+    if (solution.converged) return;
+    solution.stage = stage;
+    solution.converged = method();
+    if (!solution.converged && stage != Stage::line_search) solution.force = force;
+  };
+  attempt(Stage::newton, [&] { return newton(problem, false, solution); });
+  attempt(Stage::line_search, [&] { return newton(problem, true, solution); });
+  attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
+  attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
+  return solution;
+}
+
+template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&, double*);
+template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&, double*);
+template class ContactSolver<2>;
+template class ContactSolver<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,40 @@
+"""warmslip: dynamic frictional contact of thermo-viscoelastic bodies, with its numbers proved.
+
+    import warmslip
+    scene = warmslip.load("paper_isotropic").override(**{"mesh.n": 64, "time.steps": 64})
+    result = warmslip.run(scene, out="results/runs/first")
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from warmslip.scene import Scene, SceneError, load
+
+if TYPE_CHECKING:
+    from warmslip.loads import Loads
+    from warmslip.problem import Discretisation, discretise
+    from warmslip.run import Result, Run, run
+    from warmslip.trajectory import Trajectory
+
+__all__ = ["Discretisation", "Loads", "Result", "Run", "Scene", "SceneError", "Trajectory", "discretise", "load", "run"]
+
+# the compiled core is loaded when it is first needed: scenes can be read and checked without it
+_LAZY = {
+    "Loads": "loads",
+    "Discretisation": "problem",
+    "discretise": "problem",
+    "Result": "run",
+    "Run": "run",
+    "run": "run",
+    "Trajectory": "trajectory",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        value = getattr(importlib.import_module(f"warmslip.{_LAZY[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'warmslip' has no attribute '{name}'")

@@ -1,0 +1,185 @@
+"""The time loop: a scene in, a trajectory and a summary out."""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warmslip import _core, provenance
+from warmslip.loads import Array, Loads
+from warmslip.problem import Discretisation, discretise
+from warmslip.scene import Scene
+from warmslip.trajectory import TrajectoryWriter
+
+IDENTITIES = ("energy", "heat", "force", "law")
+# beyond this a step is not called right, whatever the solver says (verification at the extremes)
+IDENTITY_BOUND = 1e-9
+
+
+@dataclass(frozen=True)
+class Result:
+    """The end of a run: `summary` as in summary.json and the final fields in mesh numbering, (nodes, d) and (nodes,)."""
+
+    summary: dict[str, Any]
+    u: Array
+    w: Array
+    theta: Array
+    trajectory: Path | None
+
+    @property
+    def outcome(self) -> str:
+        return str(self.summary["outcome"])
+
+    @property
+    def right(self) -> bool:
+        return self.outcome == "right"
+
+
+def residuals(report: Any) -> dict[str, float]:
+    """The step's relative residual of each identity, dimensionless."""
+    return {name: float(getattr(report.ledger, f"{name}_residual")) for name in IDENTITIES}
+
+
+class Run:
+    """A scene being stepped: iterate `steps()`, or let `warmslip.run` do it."""
+
+    def __init__(self, scene: Scene, *, comm: Any = None, loads: Loads | None = None, backend: str = "automatic",
+                 discretisation: Discretisation | None = None) -> None:
+        from mpi4py import MPI
+
+        self._wall, self._cpu = time.perf_counter(), time.process_time()
+        self.scene = scene
+        self.comm = MPI.COMM_WORLD if comm is None else comm
+        self.discretisation = discretisation or discretise(scene, comm=self.comm, loads=loads)
+        self.stepper = self.discretisation.stepper(backend=backend)
+        self.worst = dict.fromkeys(IDENTITIES, 0.0)
+        self.floor = 0.0
+        self.outcome = "right"
+        self.report: Any = None
+        self.newton_max = 0
+        self.stages: dict[str, int] = {}
+
+    def steps(self) -> Iterator[Any]:
+        """Advances to the end, yielding a report a step; stops after a step that is not right, whose state is not kept."""
+        for n in range(1, self.scene.time.steps + 1):
+            report = self.stepper.advance(*self.discretisation.load_vectors.at(n * self.scene.step))
+            self.newton_max = max(self.newton_max, report.newton_iterations)
+            self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
+            if report.outcome != _core.Outcome.right:
+                self.outcome = report.outcome.name
+                return
+            self.report = report
+            for name, value in residuals(report).items():
+                self.worst[name] = max(self.worst[name], value)
+            self.floor = max(self.floor, report.ledger.law_floor)
+            yield report
+            if max(residuals(report).values()) > IDENTITY_BOUND + report.ledger.law_floor:
+                self.outcome = "identity_violated"
+                return
+
+    def summary(self) -> dict[str, Any]:
+        """What summary.json holds (collective)."""
+        s, layout, report, cost = self.stepper, self.discretisation.layout, self.report, self.stepper.cost
+        contact = dict.fromkeys(("normal_force", "tangential_force", "max_penetration"), 0.0)
+        counts = {"open": len(self.discretisation.surface.weights), "stick": 0, "slip": 0}
+        traction = [0.0] * self.discretisation.dim
+        if report is not None:
+            contact = {
+                "normal_force": report.normal_force,
+                "tangential_force": float(np.linalg.norm(report.friction_traction)),
+                "max_penetration": report.max_penetration,
+            }
+            counts = {name: getattr(report, name) for name in counts}
+            traction = list(report.traction)
+        counters = {name: getattr(cost, name) for name in type(cost).items}
+        cpu = time.process_time() - self._cpu
+        return {
+            "outcome": self.outcome,
+            "time": s.time,
+            "steps": cost.steps,
+            "norms": {
+                "u_V": layout.norm_v(s.u),
+                "u_L2": layout.norm_l2(s.u),
+                "w_L2": layout.norm_l2(s.w),
+                "theta_L2": layout.norm_l2(s.theta),
+            },
+            "contact": contact | counts | {"traction": traction},
+            "identities": self.worst | {"law_floor": self.floor},
+            "newton": {
+                "iterations": cost.newton_iterations,
+                "largest_step": self.newton_max,
+                "stages": self.stages,
+            },
+            "cpu_seconds": cpu,
+            "wall_seconds": time.perf_counter() - self._wall,
+            "memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+            "cost": counters,
+            "stamp": provenance.stamp(
+                self.scene,
+                petsc=_core.petsc_version,
+                compiler=_core.compiler,
+                ranks=self.comm.size,
+                solver=s.solver,
+                petsc_options=petsc_options(),
+            ),
+        }
+
+
+def petsc_options() -> dict[str, str]:
+    """PETSc's options database, as recorded in the stamp."""
+    from petsc4py import PETSc
+
+    return {str(k): str(v) for k, v in PETSc.Options().getAll().items()}
+
+
+def run(
+    scene: Scene,
+    *,
+    out: str | Path | None = None,
+    comm: Any = None,
+    loads: Loads | None = None,
+    backend: str = "automatic",
+    progress: Callable[[int, int, Any], None] | None = None,
+) -> Result:
+    """Runs a scene. With `out`, writes out/trajectory.h5 and out/summary.json there.
+
+    Collective over `comm` (default: all ranks). `progress(step, steps, report)` is called after every step on rank 0.
+    A run that cannot go on returns normally: see `Result.outcome`, one of right, contact_not_converged, not_finite and
+    identity_violated. Raises ValueError for a scene or loads that make no sense, OSError when `out` cannot be written.
+    """
+    folder = Path(out) if out is not None else None
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    job = Run(scene, comm=comm, loads=loads, backend=backend)
+    rank = job.comm.rank
+    path = folder / "trajectory.h5" if folder is not None else None
+    if path is None:
+        for report in job.steps():
+            if progress and rank == 0:
+                progress(job.stepper.cost.steps, scene.time.steps, report)
+    else:
+        with TrajectoryWriter(path, job.discretisation, rank) as writer:
+            writer.state(job.stepper)
+            written = 0
+            for report in job.steps():
+                writer.step(job.stepper, report)
+                done = job.stepper.cost.steps
+                if done % scene.output.every == 0 or done == scene.time.steps:
+                    writer.state(job.stepper)
+                    written = done
+                if progress and rank == 0:
+                    progress(done, scene.time.steps, report)
+            if job.stepper.cost.steps > written:
+                writer.state(job.stepper)
+    summary = job.summary()
+    if folder is not None and rank == 0:
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    fields = [job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")]
+    return Result(summary, *fields, trajectory=path)

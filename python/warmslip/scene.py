@@ -1,0 +1,374 @@
+"""Scenes: what a user asks for, typed and checked before anything is assembled. No compiled code is needed here."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, strict=True)]
+Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
+Matrix = Annotated[list[Vector], Field(min_length=2, max_length=3)]
+
+PARTS = {"square": ("left", "right", "bottom", "top"), "cube": ("left", "right", "front", "back", "bottom", "top")}
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run; the message is one sentence a problem, each with its key and its cure."""
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MeshTable(Table):
+    """A structured box. `n` bricks a side (or one number an axis), each cut along `diagonal`."""
+
+    shape: Literal["square", "cube"] = "square"
+    n: Count | list[Count] = 32
+    lengths: list[Positive] | None = None  # default: 1 along every axis
+    diagonal: Literal["right", "left", "crisscross"] = "right"
+
+    @property
+    def dim(self) -> int:
+        return 2 if self.shape == "square" else 3
+
+    @property
+    def counts(self) -> list[int]:
+        return [self.n] * self.dim if isinstance(self.n, int) else self.n
+
+    @property
+    def sides(self) -> list[float]:
+        return self.lengths or [1.0] * self.dim
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        for key in ("n", "lengths"):
+            value = getattr(self, key)
+            if isinstance(value, list) and len(value) != self.dim:
+                raise ValueError(f"{key} has {len(value)} entries but a {self.shape} has {self.dim} axes; give {self.dim}")
+        if self.dim == 3 and self.diagonal == "crisscross":
+            raise ValueError("diagonal 'crisscross' exists for shape 'square' only; use 'right' or 'left'")
+        return self
+
+
+class TimeTable(Table):
+    """`steps` uniform steps of backward Euler to time `end`."""
+
+    end: Positive = 1.0
+    steps: Count = 32
+    coupling: Literal["staggered", "lagged", "monolithic"] = "staggered"
+
+
+class InertiaTable(Table):
+    density: NonNegative = 1.0  # rho; 0 leaves the motion quasistatic
+
+
+class IsotropicTable(Table):
+    """An isotropic tensor: `lame` = [lambda, mu], or `young` and `poisson` under an assumption on the third axis."""
+
+    lame: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    young: NonNegative | None = None
+    poisson: Finite | None = None
+    assumption: Literal["plane_stress", "plane_strain", "solid"] | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        engineering = (self.young, self.poisson, self.assumption)
+        if self.lame is not None and any(value is not None for value in engineering):
+            raise ValueError("give either lame or young, poisson and assumption, not both")
+        if self.lame is None and any(value is None for value in engineering):
+            raise ValueError("give lame = [lambda, mu], or young, poisson and assumption together")
+        if self.poisson is not None:
+            top = 1.0 if self.assumption == "plane_stress" else 0.5
+            if not -1 < self.poisson < top:
+                raise ValueError(f"poisson must lie between -1 and {top:g} for {self.assumption}, got {self.poisson:g}")
+        return self
+
+    def pair(self, dim: int) -> tuple[float, float]:
+        """(lambda, mu) for `dim` dimensions, stress (or viscosity). Plane stress: E k/(1-k^2), E/(2(1+k))."""
+        if self.lame is not None:
+            return self.lame[0], self.lame[1]
+        assert self.young is not None and self.poisson is not None
+        mu = self.young / (2 * (1 + self.poisson))
+        if self.assumption == "plane_stress":
+            return self.young * self.poisson / (1 - self.poisson**2), mu
+        return self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson)), mu
+
+
+class ExpansionTable(Table):
+    tensor: Matrix  # M of (2.1), stress per temperature
+
+
+class HeatingTable(Table):
+    tensor: Matrix  # R of (2.4), heat per strain
+
+
+class HeatTable(Table):
+    conductivity: Matrix  # K of (2.2)
+    source: Finite = 0.0  # q0
+    expansion: ExpansionTable
+    heating: HeatingTable
+
+
+class LoadsTable(Table):
+    body: Vector  # f0
+    traction: dict[str, Vector] = {}  # fN by boundary part
+
+
+class SupportsTable(Table):
+    displacement: list[str]  # parts with u = 0 (Gamma_D)
+    temperature: list[str]  # parts with theta = 0
+
+
+class FrictionTable(Table):
+    coefficient: NonNegative = 0.0  # mu_tau
+
+
+class ExchangeTable(Table):
+    conductance: NonNegative = 0.0  # k_c
+    foundation_temperature: Finite = 0.0  # theta_F
+
+
+class ContactTable(Table):
+    """Normal compliance p_nu(r) = stiffness max(r, 0) on `part`, with Coulomb friction and heat exchange."""
+
+    part: str
+    stiffness: NonNegative  # c_nu
+    gap: Finite = 0.0  # g
+    quadrature: Annotated[str, Field(pattern=r"^(nodal|gauss-[1-8])$")] = "nodal"
+    friction: FrictionTable = FrictionTable()
+    heat_exchange: ExchangeTable = ExchangeTable()
+
+    @property
+    def points(self) -> int:
+        """Gauss points an edge, 0 for the vertex rule."""
+        return 0 if self.quadrature == "nodal" else int(self.quadrature.removeprefix("gauss-"))
+
+
+class InitialTable(Table):
+    """Constant initial data, set to zero on the supports."""
+
+    displacement: Vector | None = None
+    velocity: Vector | None = None
+    temperature: Finite = 0.0
+
+
+class OutputTable(Table):
+    every: Count = 1  # states stored every so many steps; the last one always
+
+
+class Scene(Table):
+    """A whole scene. Tables are blocks of the problem; keys are those of the TOML file."""
+
+    title: str = ""
+    mesh: MeshTable
+    time: TimeTable
+    inertia: InertiaTable
+    elasticity: IsotropicTable
+    viscosity: IsotropicTable
+    heat: HeatTable
+    loads: LoadsTable
+    supports: SupportsTable
+    contact: ContactTable
+    initial: InitialTable = InitialTable()
+    output: OutputTable = OutputTable()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems = [*self._part_problems(), *self._size_problems(), *self._tensor_problems()]
+        if self.inertia.density == 0 and not self.supports.displacement:
+            problems.append(
+                "supports.displacement: the momentum operator is singular without support and without inertia; "
+                "clamp a part or give inertia.density > 0"
+            )
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    def _part_problems(self) -> list[str]:
+        known = PARTS[self.mesh.shape]
+        named = {
+            "supports.displacement": self.supports.displacement,
+            "supports.temperature": self.supports.temperature,
+            "loads.traction": list(self.loads.traction),
+            "contact.part": [self.contact.part],
+        }
+        found = [
+            f"{key}: unknown boundary part '{part}'; a {self.mesh.shape} has {', '.join(known)}"
+            for key, parts in named.items()
+            for part in parts
+            if part not in known
+        ]
+        for key in ("displacement", "temperature"):
+            if self.contact.part in getattr(self.supports, key):
+                found.append(f"supports.{key}: '{self.contact.part}' is the contact part and cannot be held; remove it")
+        return found
+
+    def _size_problems(self) -> list[str]:
+        d = self.mesh.dim
+        vectors = {
+            "loads.body": self.loads.body,
+            "initial.displacement": self.initial.displacement,
+            "initial.velocity": self.initial.velocity,
+            **{f"loads.traction.{part}": value for part, value in self.loads.traction.items()},
+        }
+        found = [
+            f"{key} has {len(value)} components; a {self.mesh.shape} needs {d}"
+            for key, value in vectors.items()
+            if value is not None and len(value) != d
+        ]
+        for key, tensor in self._matrices().items():
+            if len(tensor) != d or any(len(row) != d for row in tensor):
+                found.append(f"{key} must be a {d} x {d} matrix")
+            elif any(tensor[i][j] != tensor[j][i] for i in range(d) for j in range(i)):
+                found.append(f"{key} must be symmetric; set its entries [i][j] and [j][i] equal")
+        return found
+
+    def _tensor_problems(self) -> list[str]:
+        d, found = self.mesh.dim, []
+        stiff = False
+        for key in ("elasticity", "viscosity"):
+            table: IsotropicTable = getattr(self, key)
+            if d == 3 and table.assumption in ("plane_stress", "plane_strain"):
+                found.append(f"{key}.assumption: {table.assumption} has no meaning in a cube; use solid")
+                continue
+            lam, mu = table.pair(d)
+            if mu < 0 or d * lam + 2 * mu < 0:
+                found.append(f"{key}: the tensor must not be negative; it needs mu >= 0 and {d} lambda + 2 mu >= 0")
+            stiff = stiff or mu > 0
+        if not found and not stiff and self.inertia.density == 0:
+            found.append("inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them")
+        k = self.heat.conductivity
+        if len(k) == d and all(len(row) == d for row in k) and _smallest_eigenvalue(k) < -1e-12 * max(abs(x) for r in k for x in r):
+            found.append("heat.conductivity must not have a negative eigenvalue; heat would flow from cold to hot")
+        return found
+
+    def _matrices(self) -> dict[str, list[list[float]]]:
+        return {
+            "heat.conductivity": self.heat.conductivity,
+            "heat.expansion.tensor": self.heat.expansion.tensor,
+            "heat.heating.tensor": self.heat.heating.tensor,
+        }
+
+    @property
+    def step(self) -> float:
+        """k, time."""
+        return self.time.end / self.time.steps
+
+    def resolved(self) -> dict[str, Any]:
+        """The scene as plain data, defaults filled in."""
+        return self.model_dump(mode="json")
+
+    def digest(self) -> str:
+        """A hash of the resolved scene."""
+        return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()[:16]
+
+    def override(self, **values: Any) -> Scene:
+        """The scene with some keys replaced, dots written as in `override(**{"mesh.n": 64})`; raises SceneError."""
+        data = self.model_dump(mode="json", exclude_none=True)
+        for key, value in values.items():
+            _set(data, key, value)
+        return build(data)
+
+
+def _smallest_eigenvalue(matrix: list[list[float]]) -> float:
+    import numpy as np
+
+    return float(np.linalg.eigvalsh(np.array(matrix))[0])
+
+
+def library() -> list[str]:
+    """Names of the scenes that come with the package."""
+    folder = resources.files("warmslip") / "scenes"
+    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
+
+
+def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
+    """Reads a scene by library name or path and applies `key=value` overrides.
+
+    Raises SceneError with a sentence for each problem: missing file, bad TOML, unknown key, wrong type, value out of range.
+    """
+    path = Path(scene)
+    if str(scene) in library():
+        text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text()
+    else:
+        try:
+            text = path.read_text()
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "not a text file"
+            raise SceneError(
+                f"cannot read scene '{scene}' ({reason}); give a file or one of {', '.join(library())}"
+            ) from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene '{scene}' is not valid TOML: {error}; correct that line") from None
+    for item in overrides or []:
+        key, equals, value = item.partition("=")
+        if not equals or not key.strip():
+            raise SceneError(f"'{item}' is no override; write table.key=value")
+        _set(data, key.strip(), _parse(value.strip()))
+    return build(data)
+
+
+def _parse(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _set(data: dict[str, Any], key: str, value: Any) -> None:
+    *tables, last = key.split(".")
+    for depth, table in enumerate(tables):
+        data = data.setdefault(table, {})
+        if not isinstance(data, dict):
+            raise SceneError(f"{key}: '{'.'.join(tables[: depth + 1])}' is a value, not a table")
+    data[last] = value
+
+
+def build(data: dict[str, Any]) -> Scene:
+    """A checked scene from plain data; raises SceneError with all problems at once."""
+    try:
+        return Scene.model_validate(data)
+    except ValidationError as error:
+        raise SceneError("\n".join(dict.fromkeys(_sentence(e) for e in error.errors()))) from None
+
+
+def _sentence(error: Any) -> str:
+    where = [str(part) for part in error["loc"] if not str(part).startswith(("int", "list[", "constrained"))]
+    key = ".".join(where) or "scene"
+    given = error.get("input")
+    match error["type"]:
+        case "extra_forbidden":
+            allowed = _allowed(where[:-1])
+            near = difflib.get_close_matches(where[-1], allowed, 1)
+            hint = f"did you mean '{near[0]}'" if near else f"the keys here are {', '.join(allowed)}"
+            return f"{key}: unknown key; {hint}"
+        case "missing":
+            return f"{key}: missing; add it"
+        case "value_error":
+            message = str(error["ctx"]["error"])
+            return message if key == "scene" else f"{key}: {message}"
+        case "finite_number":
+            return f"{key}: {given} is not a finite number; give one"
+        case _:
+            return f"{key} = {given!r}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
+
+
+def _allowed(where: list[str]) -> list[str]:
+    model: Any = Scene
+    for part in where:
+        field = model.model_fields.get(part) if hasattr(model, "model_fields") else None
+        model = field.annotation if field else None
+    return sorted(model.model_fields) if hasattr(model, "model_fields") else []

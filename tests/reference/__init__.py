@@ -1,0 +1,1 @@
+"""Independent SciPy implementation of the scheme (PF), shared by verification and benchmarks."""
