@@ -16,9 +16,12 @@ void bind(py::module_& m) {
       .def_property_readonly("mesh_nodes", &L::mesh_nodes, "Mesh number of every local node, owned first.")
       .def("vector", [](const L& l, int block) { return release(l.vector(block)); }, py::arg("block"), "A zero vector, `block` unknowns a node.")
       .def("gather", &L::gather, py::arg("vec"), "The whole vector in mesh numbering, on every rank (collective).")
-      .def("distribute", &L::distribute, py::arg("values"), py::arg("vec"), "Sets `vec` from values in mesh numbering, (nodes * block).")
-      .def("norm_l2", [](const L& l, Vec v) { return norm_l2<d>(l, v); }, py::arg("vec"), "|v|_L2, exact for P1 (collective).")
-      .def("norm_v", [](const L& l, Vec v) { return norm_v<d>(l, v); }, py::arg("vec"), "|eps(v)|_L2, exact for P1 (collective).");
+      .def("distribute", &L::distribute, py::arg("values"), py::arg("vec"), "Sets `vec` from values in mesh numbering, (nodes * block).");
+  using N = Norms<d>;
+  py::class_<N, std::shared_ptr<N>>(m, name<d>("Norms").c_str(), "Exact norms of P1 functions.")
+      .def(py::init<const L&>(), py::arg("layout"), py::keep_alive<1, 2>())
+      .def("l2", &N::l2, py::arg("vec"), "|v|_L2 of a function of any block size (collective).")
+      .def("v", &N::v, py::arg("vec"), "|v|_V = |eps(v)|_L2 of a displacement (collective).");
 
   using O = Operators<d>;
   auto operators = py::class_<O, std::shared_ptr<O>>(m, name<d>("Operators").c_str(), "The constant matrices as petsc4py objects, without boundary conditions.")

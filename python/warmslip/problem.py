@@ -41,6 +41,7 @@ class Discretisation:
     layout: Any
     operators: Any
     surface: Any
+    norms: Any
     load_vectors: LoadVectors
 
     @property
@@ -139,5 +140,5 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
     if len(surface.weights) == 0:
         raise ValueError(f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one")
     vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d)
-    return Discretisation(scene, loads, mesh, problem, layout, _d("Operators", d)(layout, problem), surface, vectors)
+    return Discretisation(scene, loads, mesh, problem, layout, _d("Operators", d)(layout, problem), surface, _d("Norms", d)(layout), vectors)
 

@@ -86,7 +86,7 @@ class Run:
 
     def summary(self) -> dict[str, Any]:
         """What summary.json holds (collective)."""
-        s, layout, report, cost = self.stepper, self.discretisation.layout, self.report, self.stepper.cost
+        s, norms, report, cost = self.stepper, self.discretisation.norms, self.report, self.stepper.cost
         contact = dict.fromkeys(("normal_force", "tangential_force", "max_penetration"), 0.0)
         counts = {"open": len(self.discretisation.surface.weights), "stick": 0, "slip": 0}
         traction = [0.0] * self.discretisation.dim
@@ -105,10 +105,10 @@ class Run:
             "time": s.time,
             "steps": cost.steps,
             "norms": {
-                "u_V": layout.norm_v(s.u),
-                "u_L2": layout.norm_l2(s.u),
-                "w_L2": layout.norm_l2(s.w),
-                "theta_L2": layout.norm_l2(s.theta),
+                "u_V": norms.v(s.u),
+                "u_L2": norms.l2(s.u),
+                "w_L2": norms.l2(s.w),
+                "theta_L2": norms.l2(s.theta),
             },
             "contact": contact | counts | {"traction": traction},
             "identities": self.worst | {"law_floor": self.floor},

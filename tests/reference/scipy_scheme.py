@@ -14,6 +14,7 @@ both fields instead. Every quantity is dimensionless.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from time import process_time
 
 import numpy as np
@@ -38,7 +39,7 @@ TRACTION_LEFT, TRACTION_RIGHT = np.array([1.4, 0.4]), np.array([-0.8, 0.4])
 FACTOR = dict(permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)  # status of a contact node; the slips are those with w_x > 0 and w_x < 0
-LAW_TOLERANCE = 1e-12  # on the residual of the contact law, relative to the largest traction
+LAW_TOLERANCE = 1e-12  # on the residual of the contact law, relative to the largest traction, above round-off
 NEWTON_LIMIT, SWEEP_LIMIT = 30, 10000
 
 
@@ -132,9 +133,9 @@ class Contact:
     def residual(self, s, v, r):
         """Residual of the law in units of traction, relative to the largest one; s, v (2m,), r (m,)."""
         lam, p, v_t = s[: self.m], s[self.m :], v[: self.m]
-        normal = p - self.c_nu * np.maximum(r, 0)
-        tangential = lam - np.clip(lam + self.c_t * v_t, -self.mu * p, self.mu * p)
-        return max(abs(normal).max(), abs(tangential).max()) / (abs(s).max() or 1.0)
+        p_law = self.c_nu * np.maximum(r, 0)
+        lam_law = np.clip(lam + self.c_t * v_t, -self.mu * p, self.mu * p)
+        return max(abs(p - p_law).max(), abs(lam - lam_law).max()) / (max(abs(s).max(), p_law.max()) or 1.0)
 
     def _status(self, s, v, r):
         trial, bound = s[: self.m] + self.c_t * v[: self.m], self.mu * self.c_nu * r
@@ -143,13 +144,14 @@ class Contact:
     def _newton(self, z, u_n):
         """Tractions that satisfy the law, or None if the iteration cycles; starts from self.status."""
         seen = set()
+        round_off = 8 * np.finfo(float).eps * self.c_nu * (abs(u_n) + self.k * abs(z[self.m :])).max()
         while self.status.tobytes() not in seen and len(seen) < NEWTON_LIMIT:
             seen.add(self.status.tobytes())
             self.iterations += 1
             s = self._linear(z, u_n)
             v = z - self.W @ s
             r = u_n + self.k * v[self.m :] - self.gap
-            if self.residual(s, v, r) <= LAW_TOLERANCE:
+            if self.residual(s, v, r) <= LAW_TOLERANCE + round_off / (abs(s).max() or 1.0):
                 return s
             self.status = self._status(s, v, r)
         return None
@@ -178,7 +180,7 @@ class Contact:
         self.rescues += 1
         s, W, m = np.zeros(2 * self.m), self.W, self.m
         for sweep in range(1, SWEEP_LIMIT + 1):
-            for t, n in zip(range(m), range(m, 2 * m)):
+            for t, n in ((a, m + a) for a in range(m)):
                 v_n, v_t = z[n] - W[n] @ s + W[n, n] * s[n], z[t] - W[t] @ s + W[t, t] * s[t]
                 p = self.c_nu * max(u_n[t] + self.k * v_n - self.gap, 0) / (1 + self.c_nu * self.k * W[n, n])
                 v_t += W[t, n] * (s[n] - p)
@@ -211,7 +213,7 @@ class Result:
 
 def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_nu=1e4, k_c=1.0, rho=1.0, keep="all"):
     """Run the scheme on n x n squares from rest, u = w = theta = 0, to time T; keep is "all" or "final"."""
-    parameters = dict(locals())
+    parameters = dict(locals())  # the arguments alone, so far
     if coupling not in COUPLINGS or keep not in ("all", "final"):
         raise ValueError(f"unknown coupling {coupling!r} or keep {keep!r}")
     clock = process_time()
@@ -232,7 +234,8 @@ def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_
         solver, heat_solver = factor(K, free_u), factor(H, free_theta)
     inertia, elastic, expansion = (sp.csr_matrix(sp.diags(free_u) @ X) for X in (inertia, ops["A"], ops["G"]))
     storage, heating = (sp.csr_matrix(sp.diags(free_theta) @ X) for X in (storage, ops["E"]))
-    force, source = (load * free for load, free in zip(loads(n, ops, theta_F), (free_u, free_theta)))
+    force, source = loads(n, ops, theta_F)
+    force, source = free_u * force, free_theta * source
 
     node = np.arange(m)  # the contact nodes come first; their unknowns are 2 node and 2 node + 1
     P = np.zeros((solver.shape[0], 2 * m), order="F")
@@ -265,7 +268,7 @@ def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_
             levels.clear()
         levels.append((u, w, theta))
     seconds_loop = process_time() - clock
-    u, w, theta = (np.array(field) for field in zip(*levels))
+    u, w, theta = (np.array(field) for field in zip(*levels, strict=True))
     return Result(parameters, u.reshape(-1, N, 2), w.reshape(-1, N, 2), theta, tractions[:, m:], tractions[:, :m], law,
                   contact.iterations, contact.rescues, seconds_setup, seconds_loop)
 
@@ -286,8 +289,8 @@ def identities(result):
     ops, weights, worst = operators(n, run["reading"], run["k_c"]), edge_weights(n), np.zeros(2)
     force, source = loads(n, ops, run["theta_F"])
     A, M, mass = ops["A"], ops["M"], run["rho"] * sp.kron(ops["M"], ID)
-    levels = [[field.ravel() for field in level] for level in zip(result.u, result.w, result.theta)]
-    for (u0, w0, theta0), (u, w, theta) in zip(levels, levels[1:]):
+    levels = [[field.ravel() for field in level] for level in zip(result.u, result.w, result.theta, strict=True)]
+    for (u0, w0, theta0), (u, w, theta) in pairwise(levels):
         theta_star = theta if run["coupling"] == "monolithic" else theta0
         w_star = w0 if run["coupling"] == "lagged" else w
         r0, r, slip = -u0[1 : 2 * n + 2 : 2], -u[1 : 2 * n + 2 : 2], w[0 : 2 * n + 2 : 2]

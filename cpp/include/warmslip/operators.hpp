@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 
+#include "warmslip/element.hpp"
 #include "warmslip/layout.hpp"
 #include "warmslip/problem.hpp"
 #include "warmslip/quadrature.hpp"
@@ -61,11 +62,19 @@ class LoadQuadrature {
   Eigen::VectorXd measures_;
 };
 
-/// |v|_L2 of a P1 function of any block size, exact.
+/// Exact norms of P1 functions; the geometry is computed once.
 template <int d>
-double norm_l2(const Layout<d>& layout, Vec v);
-/// |v|_V = |eps(v)|_L2 of a P1 displacement, exact.
-template <int d>
-double norm_v(const Layout<d>& layout, Vec v);
+class Norms {
+ public:
+  explicit Norms(const Layout<d>& layout);
+  /// |v|_L2 of a function of any block size.
+  double l2(Vec v) const;
+  /// |v|_V = |eps(v)|_L2 of a displacement.
+  double v(Vec v) const;
+
+ private:
+  const Layout<d>& layout_;
+  std::vector<Simplex<d>> cells_;
+};
 
 }  // namespace warmslip

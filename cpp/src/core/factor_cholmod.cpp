@@ -75,6 +75,7 @@ class CholmodFactor final : public Factor {
     // matrix that may be indefinite (quasi-definite) needs L D L^T, which only the plain form has.
     const bool definite = symmetry == Symmetry::positive_definite;
     common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
+    for (int i = 0; i < 3; ++i) common_.nrelax[i] = 0, common_.zrelax[i] = 0;  // every stored zero would be substituted
     factor_ = cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_);
     usable_ = factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
     usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_, &common_);

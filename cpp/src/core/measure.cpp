@@ -102,39 +102,45 @@ double LoadQuadrature<d>::squared_strain_distance(Vec field, const RealTable<Eig
 }
 
 template <int d>
-double norm_l2(const Layout<d>& layout, Vec v) {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
-  const Eigen::VectorXd local = layout.local(v);
-  double total = 0;
-  for (Eigen::Index c = 0; c < layout.cells(); ++c) {
-    const double volume = simplex<d>(vertices(layout.mesh(), layout.mesh_cells()[static_cast<std::size_t>(c)])).volume;
-    for (int a = 0; a < block; ++a) {
-      Eigen::Matrix<double, d + 1, 1> nodal;
-      for (int i = 0; i <= d; ++i) nodal[i] = local[layout.local_cells()(c, i) * block + a];
-      total += volume / ((d + 1) * (d + 2)) * (nodal.squaredNorm() + nodal.sum() * nodal.sum());
-    }
-  }
-  return std::sqrt(layout.sum(total));
+Norms<d>::Norms(const Layout<d>& layout) : layout_(layout) {
+  for (const Index cell : layout.mesh_cells()) cells_.push_back(simplex<d>(vertices(layout.mesh(), cell)));
 }
 
 template <int d>
-double norm_v(const Layout<d>& layout, Vec v) {
-  const Eigen::VectorXd local = layout.local(v);
+double Norms<d>::l2(Vec v) const {
+  PetscInt block;
+  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::VectorXd local = layout_.local(v);
   double total = 0;
-  for (Eigen::Index c = 0; c < layout.cells(); ++c) {
-    const Simplex<d> s = simplex<d>(vertices(layout.mesh(), layout.mesh_cells()[static_cast<std::size_t>(c)]));
-    Eigen::Matrix<double, d, d + 1> nodal;
-    for (int i = 0; i <= d; ++i) nodal.col(i) = local.segment<d>(layout.local_cells()(c, i) * d);
-    total += s.volume * to_mandel<d>(nodal * s.gradients).squaredNorm();
+  for (Eigen::Index c = 0; c < layout_.cells(); ++c) {
+    double squares = 0;
+    for (int a = 0; a < block; ++a) {
+      Eigen::Matrix<double, d + 1, 1> nodal;
+      for (int i = 0; i <= d; ++i) nodal[i] = local[layout_.local_cells()(c, i) * block + a];
+      squares += nodal.squaredNorm() + nodal.sum() * nodal.sum();
+    }
+    total += cells_[static_cast<std::size_t>(c)].volume / ((d + 1) * (d + 2)) * squares;
   }
-  return std::sqrt(layout.sum(total));
+  return std::sqrt(layout_.sum(total));
+}
+
+template <int d>
+double Norms<d>::v(Vec v) const {
+  const Eigen::VectorXd local = layout_.local(v);
+  double total = 0;
+  for (Eigen::Index c = 0; c < layout_.cells(); ++c) {
+    const Simplex<d>& s = cells_[static_cast<std::size_t>(c)];
+    Eigen::Matrix<double, d, d + 1> nodal;
+    for (int i = 0; i <= d; ++i) nodal.col(i) = local.segment<d>(layout_.local_cells()(c, i) * d);
+    const Tensor2<d> gradient = nodal * s.gradients;
+    total += s.volume * 0.25 * (gradient + gradient.transpose()).squaredNorm();
+  }
+  return std::sqrt(layout_.sum(total));
 }
 
 #define WARMSLIP_INSTANTIATE(d)                          \
   template class LoadQuadrature<d>;                      \
-  template double norm_l2<d>(const Layout<d>&, Vec);     \
-  template double norm_v<d>(const Layout<d>&, Vec);
+  template class Norms<d>;
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

@@ -24,17 +24,6 @@ MatHandle assemble(const Layout<d>& layout, int rows, int cols, Kernel&& kernel)
   return a;
 }
 
-// The scalar mass of a simplex on each of d components.
-template <int d>
-VectorBlock<d> vector_mass_block(const Simplex<d>& s) {
-  const ScalarBlock<d> m = mass<d + 1>(s.volume);
-  VectorBlock<d> block = VectorBlock<d>::Zero();
-  for (int i = 0; i <= d; ++i)
-    for (int j = 0; j <= d; ++j)
-      for (int a = 0; a < d; ++a) block(i * d + a, j * d + a) = m(i, j);
-  return block;
-}
-
 // int k_c theta eta over the facets of Gamma_C
 template <int d>
 MatHandle exchange_matrix(const Layout<d>& layout, const Problem<d>& problem) {
@@ -94,7 +83,7 @@ template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k) {
   const Material<d>& m = problem.material;
   MatHandle a = assemble(layout, d, d, [&](const Simplex<d>& s) -> VectorBlock<d> {
-    return m.density / k * vector_mass_block<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity);
+    return (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
   });
   fix(a, operators.clamped);
   return a;
@@ -116,7 +105,7 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   const Material<d>& m = problem.material;
   constexpr int b = d + 1;
   MatHandle a = assemble(layout, b, b, [&](const Simplex<d>& s) {
-    const VectorBlock<d> momentum = m.density / k * vector_mass_block<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity);
+    const VectorBlock<d> momentum = (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
     const MixedBlock<d> expansion = coupling<d>(s, m.expansion), heating = coupling<d>(s, m.heating);
     const ScalarBlock<d> heat = mass<d + 1>(s.volume) / k + conduction<d>(s, m.conductivity);
     Eigen::Matrix<double, b*(d + 1), b*(d + 1)> block;
