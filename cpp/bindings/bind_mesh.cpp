@@ -25,19 +25,13 @@ void bind(py::module_& m) {
       }, "Facets (f, d) of every named boundary part.")
       .def_property_readonly("dim", [](const Mesh<d>&) { return d; });
   m.def("prolongation", [](const Mesh<d>& coarse, const Mesh<d>& fine) { return prolongation<d>(coarse, fine); },
-        py::arg("coarse"), py::arg("fine"), "Exact interpolation of P1 functions between nested meshes; ValueError if they are not.");
+        py::arg("coarse"), py::arg("fine"), "Exact interpolation of P1 functions between nested meshes, a SciPy CSR matrix (fine nodes, coarse nodes); ValueError if they are not nested.");
 }
 
 }  // namespace
 
 void bind_mesh(py::module_& m) {
   py::enum_<Diagonal>(m, "Diagonal").value("right", Diagonal::right).value("left", Diagonal::left).value("crisscross", Diagonal::crisscross);
-  py::class_<Prolongation>(m, "Prolongation")
-      .def_property_readonly("shape", [](const Prolongation& p) { return std::pair(p.rows(), p.cols()); }, "(fine nodes, coarse nodes)")
-      .def("__call__", [](const Prolongation& p, const RealTable<Eigen::Dynamic>& values) -> RealTable<Eigen::Dynamic> {
-        if (values.rows() != p.cols()) throw std::invalid_argument("expected one row for each of the " + std::to_string(p.cols()) + " coarse nodes");
-        return p * values;
-      }, py::arg("values"), "Nodal values (coarse nodes, components) on the fine nodes.");
   m.def("simplex_rule", [](int dim, int points) {
     const Rule rule = simplex_rule(dim, points);
     return std::pair(rule.barycentric, rule.weights);

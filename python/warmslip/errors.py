@@ -1,0 +1,90 @@
+"""Errors of discrete solutions: against a finer nested one, and against exact functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from warmslip import _core
+from warmslip.loads import Array
+from warmslip.problem import Discretisation
+
+TERMS = ("u_V", "w_L2", "theta_L2", "u_L2")
+SUMS = {"u_theta": ("u_V", "theta_L2"), "u_w_theta": ("u_V", "w_L2", "theta_L2")}
+
+
+class Comparison:
+    """Measures the distance of states on a coarse mesh to states on a nested fine one, exactly."""
+
+    def __init__(self, coarse: Discretisation, fine: Discretisation) -> None:
+        self._coarse, self._fine = coarse, fine
+        # the same mesh needs no interpolation
+        self._prolong = None if coarse.mesh is fine.mesh else _core.prolongation(coarse.mesh, fine.mesh)
+
+    def difference(self, coarse: Any, fine: Any) -> dict[str, float]:
+        """Errors of the state of stepper `coarse` against that of stepper `fine` (collective)."""
+        d = self._fine.dim
+        vectors = [fine.u.copy(), fine.w.copy(), fine.theta.copy()]
+        if self._prolong is None:
+            for vector, own in zip(vectors, (coarse.u, coarse.w, coarse.theta), strict=True):
+                vector.axpy(-1.0, own)
+        else:
+            parts = [self._coarse.layout.gather(v).reshape(len(self._coarse.mesh.nodes), -1) for v in (coarse.u, coarse.w, coarse.theta)]
+            values = self._prolong @ np.hstack(parts)
+            moved = self._fine.layout.vector(d), self._fine.layout.vector(d), self._fine.layout.vector(1)
+            columns = (values[:, :d], values[:, d : 2 * d], values[:, 2 * d])
+            for vector, space, part in zip(vectors, moved, columns, strict=True):
+                self._fine.layout.distribute(np.ascontiguousarray(part).ravel(), space)
+                vector.axpy(-1.0, space)
+        u, w, theta = vectors
+        norms = self._fine.norms
+        return {"u_V": norms.v(u), "w_L2": norms.l2(w), "theta_L2": norms.l2(theta), "u_L2": norms.l2(u)}
+
+
+class ExactErrors:
+    """Distance of a state to exact fields by quadrature of degree 9.
+
+    `u`, `w`, `theta` map positions (points, d) and time to (points, d) or (points,); `gradient` maps to (points, d, d), the
+    derivative of component i along axis j at [i, j], of u.
+    """
+
+    def __init__(
+        self,
+        discretisation: Discretisation,
+        *,
+        u: Callable[[Array, float], Array],
+        w: Callable[[Array, float], Array],
+        theta: Callable[[Array, float], Array],
+        gradient: Callable[[Array, float], Array],
+    ) -> None:
+        quadrature = _core.LoadQuadrature2 if discretisation.dim == 2 else _core.LoadQuadrature3
+        self._rule = quadrature(discretisation.layout, None, 5)
+        self._exact = u, w, theta, gradient
+
+    def of(self, stepper: Any) -> dict[str, float]:
+        """The errors of the stepper's state at its time (collective)."""
+        x, t = self._rule.positions, stepper.time
+        u, w, theta, gradient = (np.asarray(f(x, t), dtype=float) for f in self._exact)
+        distance = self._rule.squared_distance
+        squares = {
+            "u_V": self._rule.squared_strain_distance(stepper.u, gradient.reshape(len(x), -1)),
+            "w_L2": distance(stepper.w, w),
+            "theta_L2": distance(stepper.theta, theta[:, None]),
+            "u_L2": distance(stepper.u, u),
+        }
+        return {name: float(np.sqrt(value)) for name, value in squares.items()}
+
+
+class Largest:
+    """Largest error over time, of every term and of every sum of terms at one time, as the theorem has it."""
+
+    def __init__(self) -> None:
+        self.values = dict.fromkeys([*TERMS, *SUMS], 0.0)
+
+    def add(self, errors: dict[str, float]) -> None:
+        for name in TERMS:
+            self.values[name] = max(self.values[name], errors[name])
+        for name, terms in SUMS.items():
+            self.values[name] = max(self.values[name], sum(errors[term] for term in terms))

@@ -1,0 +1,143 @@
+"""The refinement study of a scene: every member of an h,k grid marches beside the reference and is measured as it goes.
+
+All members share the clock of the reference, so nothing is stored: at each time that a member reaches, its distance to
+the reference is measured and its maximum kept. Members on one mesh share their operators; each step size has its factors.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warmslip import _core, provenance
+from warmslip.errors import Comparison, Largest
+from warmslip.problem import Discretisation, discretise
+from warmslip.run import IDENTITIES, Run, petsc_options
+from warmslip.scene import Scene, SceneError
+
+
+def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int]]:
+    """(1/h, steps) of the grid: `diagonal` has h = k, `full` every pair; the reference itself is not a member."""
+    if any(reference % level for level in levels):
+        raise SceneError(f"levels {levels} do not divide the reference {reference}; meshes and times would not be nested")
+    if grid == "diagonal":
+        return [(n, n) for n in levels]
+    sizes = [*levels, reference]
+    return [(n, m) for n in sizes for m in sizes if (n, m) != (reference, reference)]
+
+
+def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
+    """L2 norm of the von Mises stress (of the elementwise constant stress at the centroids), and its maximum."""
+    u, w, theta = (d.field(getattr(stepper, name)) for name in ("u", "w", "theta"))
+    mises = von_mises(d.stress(u, w, theta))
+    x = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
+    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if d.dim == 2 else 6)
+    return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
+
+
+def von_mises(stress: Any) -> Any:
+    """sqrt(3/2 s:s) with s the deviator of the stress, its missing row and column zero for d = 2 (plane stress): (cells,)."""
+    full = np.zeros((len(stress), 3, 3))
+    d = stress.shape[1]
+    full[:, :d, :d] = stress
+    deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+    return np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator))
+
+
+def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
+    """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
+    s, d = job.stepper, job.discretisation
+    cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
+    report = job.report
+    return (
+        {"n": job.scene.mesh.counts[0], "steps": job.scene.time.steps, "h": 1 / job.scene.mesh.counts[0], "k": job.scene.step}
+        | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
+        | {"outcome": job.outcome}
+        | {f"identity_{name}": job.worst[name] for name in IDENTITIES}
+        | {"norm_u_V": d.norms.v(s.u), "norm_u_L2": d.norms.l2(s.u), "norm_w_L2": d.norms.l2(s.w), "norm_theta_L2": d.norms.l2(s.theta)}
+        | stress_measures(d, s)
+        | {
+            "normal_force": report.normal_force if report else 0.0,
+            "tangential_force": float(np.linalg.norm(report.friction_traction)) if report else 0.0,
+            "max_penetration": report.max_penetration if report else 0.0,
+            "open": report.open if report else 0,
+            "stick": report.stick if report else 0,
+            "slip": report.slip if report else 0,
+            "newton_largest": job.newton_max,
+            "safeguarded_steps": sum(count for stage, count in job.stages.items() if stage != "newton"),
+            "unknowns": d.unknowns,
+            "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
+        }
+        | cost
+    )
+
+
+def study(
+    scene: Scene,
+    *,
+    levels: list[int],
+    reference: int,
+    grid: str = "diagonal",
+    progress: Callable[[int, int], None] | None = None,
+) -> list[dict[str, Any]]:
+    """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
+
+    Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
+    Raises RuntimeError naming the member when a run does not end right.
+    """
+    meshes: dict[int, Discretisation] = {}
+
+    def job(n: int, steps: int) -> Run:
+        one = scene.override(**{"mesh.n": n, "time.steps": steps})
+        if n not in meshes:
+            meshes[n] = discretise(one)
+        return Run(one, discretisation=replace(meshes[n], scene=one))
+
+    finest = job(reference, reference)
+    runs = [(job(n, m), Largest()) for n, m in members(levels, reference, grid)]
+    compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
+    steps = {id(run): run.steps() for run, _ in runs}
+    marching = finest.steps()
+    for n in range(1, reference + 1):
+        _next(marching, finest)
+        for run, largest in runs:
+            if n % (reference // run.scene.time.steps) == 0:
+                _next(steps[id(run)], run)
+                largest.add(compare[run.scene.mesh.counts[0]].difference(run.stepper, finest.stepper))
+        if progress:
+            progress(n, reference)
+    return [*(row(run, largest.values) for run, largest in runs), row(finest, None)]
+
+
+def _next(steps: Any, run: Run) -> None:
+    if next(steps, None) is None:
+        m = run.scene
+        raise RuntimeError(f"the run with n = {m.mesh.n}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}")
+
+
+def stamp(scene: Scene, **more: Any) -> dict[str, Any]:
+    """Provenance of a study's table."""
+    return provenance.stamp(
+        scene,
+        petsc=_core.petsc_version,
+        compiler=_core.compiler,
+        ranks=1,
+        petsc_options=petsc_options(),
+        peak_memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        **more,
+    )
+
+
+def write(path: Path, table: list[dict[str, Any]], record: dict[str, Any]) -> None:
+    """The table as CSV with 17 digits, and its stamp beside it as .json."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [",".join(table[0])]
+    lines += [",".join(f"{value:.17g}" if isinstance(value, float) else str(value) for value in line.values()) for line in table]
+    path.write_text("\n".join(lines) + "\n")
+    path.with_suffix(".json").write_text(json.dumps(record, indent=2) + "\n")
