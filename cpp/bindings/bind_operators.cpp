@@ -20,7 +20,7 @@ void bind(py::module_& m) {
   using N = Norms<d>;
   py::class_<N, std::shared_ptr<N>>(m, name<d>("Norms").c_str(), "Exact norms of P1 functions.")
       .def(py::init<const L&>(), py::arg("layout"), py::keep_alive<1, 2>())
-      .def("l2", &N::l2, py::arg("vec"), "|v|_L2 of a function of any block size (collective).")
+      .def("l2", &N::l2, py::arg("vec"), "|v|_L2 of a scalar or a vector field (collective).")
       .def("v", &N::v, py::arg("vec"), "|v|_V = |eps(v)|_L2 of a displacement (collective).");
 
   using O = Operators<d>;

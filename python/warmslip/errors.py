@@ -11,7 +11,7 @@ from warmslip import _core
 from warmslip.loads import Array
 from warmslip.problem import Discretisation
 
-TERMS = ("u_V", "w_L2", "theta_L2", "u_L2")
+TERMS = ("u_V", "w_L2", "theta_L2")
 SUMS = {"u_theta": ("u_V", "theta_L2"), "u_w_theta": ("u_V", "w_L2", "theta_L2")}
 
 
@@ -40,13 +40,13 @@ class Comparison:
                 vector.axpy(-1.0, space)
         u, w, theta = vectors
         norms = self._fine.norms
-        return {"u_V": norms.v(u), "w_L2": norms.l2(w), "theta_L2": norms.l2(theta), "u_L2": norms.l2(u)}
+        return {"u_V": norms.v(u), "w_L2": norms.l2(w), "theta_L2": norms.l2(theta)}
 
 
 class ExactErrors:
     """Distance of a state to exact fields by quadrature of degree 9.
 
-    `u`, `w`, `theta` map positions (points, d) and time to (points, d) or (points,); `gradient` maps to (points, d, d), the
+    `w`, `theta` map positions (points, d) and time to (points, d) or (points,); `gradient` maps to (points, d, d), the
     derivative of component i along axis j at [i, j], of u.
     """
 
@@ -54,25 +54,23 @@ class ExactErrors:
         self,
         discretisation: Discretisation,
         *,
-        u: Callable[[Array, float], Array],
         w: Callable[[Array, float], Array],
         theta: Callable[[Array, float], Array],
         gradient: Callable[[Array, float], Array],
     ) -> None:
         quadrature = _core.LoadQuadrature2 if discretisation.dim == 2 else _core.LoadQuadrature3
         self._rule = quadrature(discretisation.layout, None, 5)
-        self._exact = u, w, theta, gradient
+        self._exact = w, theta, gradient
 
     def of(self, stepper: Any) -> dict[str, float]:
         """The errors of the stepper's state at its time (collective)."""
         x, t = self._rule.positions, stepper.time
-        u, w, theta, gradient = (np.asarray(f(x, t), dtype=float) for f in self._exact)
+        w, theta, gradient = (np.asarray(f(x, t), dtype=float) for f in self._exact)
         distance = self._rule.squared_distance
         squares = {
             "u_V": self._rule.squared_strain_distance(stepper.u, gradient.reshape(len(x), -1)),
             "w_L2": distance(stepper.w, w),
             "theta_L2": distance(stepper.theta, theta[:, None]),
-            "u_L2": distance(stepper.u, u),
         }
         return {name: float(np.sqrt(value)) for name, value in squares.items()}
 

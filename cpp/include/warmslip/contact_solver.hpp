@@ -67,7 +67,8 @@ class ContactSolver {
 
   Eigen::MatrixXd compliance_;
   ContactOptions options_;
-  double spectral_ = 0;               // bound on the largest eigenvalue of the compliance
+  Eigen::VectorXd reach_;             // row sums of |compliance|
+  double spectral_ = 0;               // their largest, a bound on the eigenvalues of the compliance
   std::vector<int> factored_;         // statuses the tangent below belongs to
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };

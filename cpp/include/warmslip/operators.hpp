@@ -67,12 +67,15 @@ template <int d>
 class Norms {
  public:
   explicit Norms(const Layout<d>& layout);
-  /// |v|_L2 of a function of any block size.
+  /// |v|_L2 of a scalar or a vector field.
   double l2(Vec v) const;
   /// |v|_V = |eps(v)|_L2 of a displacement.
   double v(Vec v) const;
 
  private:
+  template <int block>
+  double squared_l2(const Eigen::VectorXd& local) const;
+
   const Layout<d>& layout_;
   std::vector<Simplex<d>> cells_;
 };

@@ -8,7 +8,8 @@ std::unique_ptr<Factor> factor_with_cholmod(Mat, const std::vector<PetscInt>&, S
 #include <suitesparse/cholmod.h>
 
 #include <algorithm>
-#include <numeric>
+
+#include "warmslip/panels.hpp"
 
 namespace warmslip {
 namespace {
@@ -71,8 +72,8 @@ class CholmodFactor final : public Factor {
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_GIVEN;
     common_.postorder = 0;  // it would move the trailing unknowns
-    // Factor with dense blocks, substitute without: a single right-hand side is quicker on the plain columns. A symmetric
-    // matrix that may be indefinite (quasi-definite) needs L D L^T, which only the plain form has.
+    // A symmetric matrix that may be indefinite (quasi-definite) needs L D L^T from the start; a definite one is factored
+    // quicker in dense blocks as L L^T and then brought to the same form.
     const bool definite = symmetry == Symmetry::positive_definite;
     common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     for (int i = 0; i < 3; ++i) common_.nrelax[i] = 0, common_.zrelax[i] = 0;  // every stored zero would be substituted
@@ -80,16 +81,16 @@ class CholmodFactor final : public Factor {
     usable_ = factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
     usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_, &common_);
     if (!usable_) return;
-    common_.final_ll = 0;
-    right_ = cholmod_zeros(n, 1, CHOLMOD_REAL, &common_);
-    half_ = cholmod_zeros(n, 1, CHOLMOD_REAL, &common_);
     last_block();
+    panels_ = Panels(n, static_cast<const int*>(factor_->p), static_cast<const int*>(factor_->nz),
+                     static_cast<const int*>(factor_->i), static_cast<const double*>(factor_->x));
+    cholmod_free_factor(&factor_, &common_);
+    half_.resize(static_cast<Eigen::Index>(n));
     usable_ = accurate(k);
     substitutions_ = 0;
   }
 
   ~CholmodFactor() override {
-    for (cholmod_dense** x : {&right_, &half_, &out_, &work_, &extra_}) cholmod_free_dense(x, &common_);
     if (factor_) cholmod_free_factor(&factor_, &common_);
     cholmod_finish(&common_);
   }
@@ -99,20 +100,18 @@ class CholmodFactor final : public Factor {
   Eigen::VectorXd reduce(Vec r) override {
     {
       Values values(r);
-      double* x = static_cast<double*>(right_->x);
-      for (std::size_t i = 0; i < permutation_.size(); ++i) x[i] = (*values)[permutation_[i]];
+      for (std::size_t i = 0; i < permutation_.size(); ++i) half_[static_cast<Eigen::Index>(i)] = (*values)[permutation_[i]];
     }
-    sweep(CHOLMOD_L, right_, half_);
+    panels_.forward(half_.data());
     ++substitutions_;
-    return last_.transpose().triangularView<Eigen::UnitUpper>().solve(tail().cwiseQuotient(pivots_));
+    return last_.transpose().triangularView<Eigen::UnitUpper>().solve(half_.tail(held_).cwiseQuotient(pivots_));
   }
 
   void expand(const Eigen::VectorXd& load, Vec x) override {
-    if (held_ > 0) tail() -= last_.triangularView<Eigen::UnitLower>().solve(load);
-    sweep(CHOLMOD_DLt, half_, out_);
+    if (held_ > 0) half_.tail(held_) -= last_.triangularView<Eigen::UnitLower>().solve(load);
+    panels_.backward(half_.data());
     Values values(x);
-    const double* from = static_cast<const double*>(out_->x);
-    for (std::size_t i = 0; i < permutation_.size(); ++i) (*values)[permutation_[i]] = from[i];
+    for (std::size_t i = 0; i < permutation_.size(); ++i) (*values)[permutation_[i]] = half_[static_cast<Eigen::Index>(i)];
   }
 
   const Eigen::MatrixXd& compliance() override {
@@ -122,14 +121,12 @@ class CholmodFactor final : public Factor {
     return compliance_;
   }
 
-  double bytes() const override { return 12.0 * static_cast<double>(factor_->nzmax); }
+  double bytes() const override { return panels_.bytes(); }
   std::string description() const override {
     return std::string("CHOLMOD L D L^T, ") + (metis_ ? "METIS" : "AMD") + " ordering, contact unknowns last";
   }
 
  private:
-  Eigen::Map<Eigen::VectorXd> tail() { return {static_cast<double*>(half_->x) + interior_, held_}; }
-
   // Isolated (clamped) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing ones.
   std::vector<int> ordering(const Triangle& a, const std::vector<PetscInt>& trailing, int n, int block) {
     std::vector<bool> last(static_cast<std::size_t>(n), false);
@@ -210,14 +207,10 @@ class CholmodFactor final : public Factor {
     return error <= 1e-12 * (size + factor_size * solution);
   }
 
-  void sweep(int system, cholmod_dense* from, cholmod_dense*& to) {
-    if (!cholmod_solve2(system, factor_, from, nullptr, &to, nullptr, &work_, &extra_, &common_))
-      throw std::runtime_error("CHOLMOD ran out of memory in a substitution");
-  }
-
   cholmod_common common_{};
   cholmod_factor* factor_ = nullptr;
-  cholmod_dense *right_ = nullptr, *half_ = nullptr, *out_ = nullptr, *work_ = nullptr, *extra_ = nullptr;
+  Panels panels_;
+  Eigen::VectorXd half_;  // the right-hand side, half way
   std::vector<int> permutation_;
   Eigen::Index held_ = 0, interior_ = 0;
   Eigen::MatrixXd last_, compliance_;

@@ -106,22 +106,26 @@ Norms<d>::Norms(const Layout<d>& layout) : layout_(layout) {
   for (const Index cell : layout.mesh_cells()) cells_.push_back(simplex<d>(vertices(layout.mesh(), cell)));
 }
 
+// int |v|^2 = volume / ((d+1)(d+2)) (sum_i |v_i|^2 + |sum_i v_i|^2) on a simplex
+template <int d>
+template <int block>
+double Norms<d>::squared_l2(const Eigen::VectorXd& local) const {
+  double total = 0;
+  for (Eigen::Index c = 0; c < layout_.cells(); ++c) {
+    Eigen::Matrix<double, block, d + 1> nodal;
+    for (int i = 0; i <= d; ++i) nodal.col(i) = local.segment<block>(layout_.local_cells()(c, i) * block);
+    total += cells_[static_cast<std::size_t>(c)].volume * (nodal.squaredNorm() + nodal.rowwise().sum().squaredNorm());
+  }
+  return total / ((d + 1) * (d + 2));
+}
+
 template <int d>
 double Norms<d>::l2(Vec v) const {
   PetscInt block;
   WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  if (block != 1 && block != d) throw std::invalid_argument("an L2 norm is for scalars and for vectors of the space's dimension");
   const Eigen::VectorXd local = layout_.local(v);
-  double total = 0;
-  for (Eigen::Index c = 0; c < layout_.cells(); ++c) {
-    double squares = 0;
-    for (int a = 0; a < block; ++a) {
-      Eigen::Matrix<double, d + 1, 1> nodal;
-      for (int i = 0; i <= d; ++i) nodal[i] = local[layout_.local_cells()(c, i) * block + a];
-      squares += nodal.squaredNorm() + nodal.sum() * nodal.sum();
-    }
-    total += cells_[static_cast<std::size_t>(c)].volume / ((d + 1) * (d + 2)) * squares;
-  }
-  return std::sqrt(layout_.sum(total));
+  return std::sqrt(layout_.sum(block == 1 ? squared_l2<1>(local) : squared_l2<d>(local)));
 }
 
 template <int d>

@@ -51,7 +51,8 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
     : compliance_(std::move(compliance)), options_(options) {
   if (compliance_.rows() != compliance_.cols() || compliance_.rows() % d != 0)
     throw std::invalid_argument("the compliance must be square with d rows a contact point");
-  spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
+  reach_ = compliance_.cwiseAbs().rowwise().sum();
+  spectral_ = compliance_.size() ? reach_.maxCoeff() : 0;
 }
 
 template <int d>
@@ -68,7 +69,8 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
     const double normal = nu.dot(own * nu);
     // rows in units of force, of order one in the force whatever the stiffness
     const double alpha = 1 / (1 + problem.points[i].weight * stiffness * problem.step * normal);
-    const double beta = (d - 1) / std::max(own.trace() - normal, 1e-300);
+    // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more often
+    const double beta = 1 / std::max(reach_.template segment<d>(row).maxCoeff(), 1e-300);
     at.points.push_back(residual<d>(problem.law, problem.points[i], problem.step, alpha, beta, force.template segment<d>(row),
                                     at.velocity.template segment<d>(row)));
     at.value.template segment<d>(row) = at.points.back().value;

@@ -1,0 +1,148 @@
+"""Figure 5 as the paper drew it, and beside it the orders with the bias of the self-reference removed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from warmslip.figures.style import GREY, INK, PALE, SUMS, TERMS, case, column, grid_lines, number, rows
+
+# the legible ticks of the paper's figure 5
+TICKS_X, TICKS_Y = (0.025, 0.05, 0.1), (5e-3, 1e-2, 5e-2, 1e-1, 1.5e-1)
+MORE_X, MORE_Y = (0.2, 0.5), (1e-5, 5e-5, 1e-4, 5e-4, 1e-3, 0.5, 1.0, 5.0)
+
+
+def diagonal(path: Path) -> list[dict[str, str]]:
+    """The lines of a study with h = k that have an error, coarse to fine."""
+    lines = [line for line in rows(path) if line["n"] == line["steps"] and np.isfinite(float(line["e_u_V"]))]
+    return sorted(lines, key=lambda line: int(line["n"]))
+
+
+def ticks(axis: Any, paper: tuple[float, ...], more: tuple[float, ...], low: float, high: float) -> None:
+    """The paper's ticks, and further ones only where the data leave them."""
+    shown = [t for t in sorted({*paper, *more}) if low <= t <= high and (t in paper or not min(paper) < t < max(paper))]
+    axis.set_major_locator(FixedLocator(shown))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(lambda value, _: number(value))
+
+
+def triangle(ax: Any, low: float, high: float, level: float) -> None:
+    """A triangle of slope 1 in log-log axes between `low` and `high`, its lower corner at `level`."""
+    ax.fill([low, high, high], [level, level, level * high / low], fc="none", ec=INK, lw=0.9)
+    ax.annotate("1", (np.sqrt(low * high), level), (0, -9), textcoords="offset points", ha="center", fontsize=8)
+    ax.annotate("1", (high, level * np.sqrt(high / low)), (4, -3), textcoords="offset points", fontsize=8)
+
+
+def errors(inputs: list[Path]) -> tuple[Figure, str]:
+    """Figure 5: the estimated errors against h+k, each term and both sums; one study a panel."""
+    tables = [diagonal(path) for path in inputs]
+    figure, axes = plt.subplots(
+        1, len(tables), figsize=(3.9 * len(tables), 4.4), sharex=True, sharey=True, squeeze=False
+    )
+    every = np.concatenate([column(t, f"e_{name}") for t in tables for name in {**TERMS, **SUMS}])
+    steps = np.concatenate([column(t, "h") + column(t, "k") for t in tables])
+    x = steps.min() / 1.25, steps.max() * 1.25
+    y = min(every.min() / 3.2, 4.5e-3), max(every.max() * 1.4, 1.7e-1)
+    for ax, table, path in zip(axes[0], tables, inputs, strict=True):
+        size = column(table, "h") + column(table, "k")
+        ax.axhspan(TICKS_Y[0], TICKS_Y[-1], fc=PALE, zorder=0)
+        for name, (label, colour, marker) in {**TERMS, **SUMS}.items():
+            style = "-" if name in TERMS else (0, (4, 2))
+            text = label if name in TERMS else f"$E^{{hk}}$: {label}"
+            ax.loglog(
+                size,
+                column(table, f"e_{name}"),
+                marker=marker,
+                color=colour,
+                ls=style,
+                label=text,
+                mec="white",
+                mew=0.5,
+            )
+        triangle(ax, x[1] / 2.6, x[1] / 1.5, y[0] * 1.5)
+        ax.set(xlim=x, ylim=y, xlabel="$h + k$", title=case(path).panel)
+        ticks(ax.xaxis, TICKS_X, MORE_X, *x)
+        ticks(ax.yaxis, TICKS_Y, MORE_Y, *y)
+        grid_lines(ax)
+    axes[0, 0].set_ylabel("estimated error, largest over time")
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, columnspacing=1.1, handlelength=2
+    )
+    said = [spoken(table, case(path).theta) for table, path in zip(tables, inputs, strict=True)]
+    reference = max(int(line["n"]) for line in rows(inputs[0]))
+    head = (
+        f"Reading '{case(inputs[0]).reading}', {case(inputs[0]).coupling} coupling: estimated errors against h + k as in "
+        f"the paper's figure 5, h = k from 1/{tables[0][0]['n']} to 1/{tables[0][-1]['n']}, the solution at 1/{reference} "
+        "standing in for the exact one. Ticks are the paper's where it has them, the grey band is the range of its ticks."
+    )
+    return figure, " ".join([head, *said])
+
+
+def spoken(table: list[dict[str, str]], theta: str) -> str:
+    """The errors of both sums, coarsest to finest, and their mean orders, as a sentence."""
+    sums = [
+        f"{number(e[0])} to {number(e[-1])} {words} the velocity term (mean order {mean_order(table, name):.2f})"
+        for name, words in (("u_w_theta", "with"), ("u_theta", "without"))
+        for e in [column(table, f"e_{name}")]
+    ]
+    return f"For theta_F = {theta}: E from {sums[0]}, from {sums[1]}."
+
+
+def mean_order(table: list[dict[str, str]], name: str) -> float:
+    e, h = column(table, f"e_{name}"), column(table, "h")
+    return float(np.log(e[0] / e[-1]) / np.log(h[0] / h[-1])) if len(e) > 1 else float("nan")
+
+
+def corrected(inputs: list[Path]) -> tuple[Figure, str]:
+    """Observed and bias-corrected orders against the entitled ones. Inputs: the rates, then the studies to show."""
+    rates, studies = rows(inputs[0]), inputs[1:]
+    figure, axes = plt.subplots(
+        1, len(studies), figsize=(3.9 * len(studies), 4.2), sharex=True, sharey=True, squeeze=False
+    )
+    said = []
+    for ax, path in zip(axes[0], studies, strict=True):
+        said.append(orders(ax, [line for line in rates if line["case"] == path.stem], case(path).theta))
+        ax.set(xlabel="$h = k$", title=case(path).panel)
+        grid_lines(ax)
+    bottom, top = axes[0, 0].get_ylim()
+    axes[0, 0].set(ylim=(min(bottom, 0), max(top, 1.5)), ylabel="order")
+    sizes = sorted({float(line["h"]) for line in rates if np.isfinite(float(line["observed"] or "nan"))})
+    axes[0, 0].set_xscale("log", base=2)
+    axes[0, 0].set_xlim(sizes[0] / 1.3, sizes[-1] * 1.3)
+    axes[0, 0].xaxis.set_major_locator(FixedLocator(sizes))
+    axes[0, 0].xaxis.set_major_formatter(lambda value, _: f"1/{1 / value:.0f}")
+    names = [Line2D([], [], color=colour, marker=marker, label=label) for label, colour, marker in TERMS.values()]
+    kinds = [
+        Line2D([], [], color=GREY, ls=":", marker="o", mfc="white", label="observed"),
+        Line2D([], [], color=GREY, marker="o", label="bias removed"),
+        Line2D([], [], color=GREY, lw=4, alpha=0.35, label="entitled"),
+    ]
+    figure.legend(handles=[*names, *kinds], loc="outside lower center", ncols=6, columnspacing=1.1, handlelength=2)
+    head = (
+        f"Reading '{case(studies[0]).reading}': orders between successive h = k. Dotted: as observed against the finest "
+        "solution, which flatters the last ones; solid: with that bias removed; wide pale lines: the order that the "
+        "problem is entitled to."
+    )
+    return figure, " ".join([head, *said])
+
+
+def orders(ax: Any, lines: list[dict[str, str]], theta: str) -> str:
+    """Draws the orders of one study; returns its sentence for the caption."""
+    parts = []
+    for name, (_, colour, marker) in TERMS.items():
+        own = sorted((line for line in lines if line["term"] == name), key=lambda line: -float(line["h"]))
+        h, entitled = column(own, "h"), column(own, "entitled")
+        ax.plot(h, entitled, color=colour, lw=5, alpha=0.25, solid_capstyle="butt")
+        ax.plot(h, column(own, "observed"), color=colour, ls=":", marker=marker, mfc="white")
+        ax.plot(h, column(own, "corrected"), color=colour, marker=marker, mec="white", mew=0.5)
+        last = own[-1]
+        parts.append(
+            f"{name} {float(last['observed']):.2f} / {float(last['corrected']):.2f} / {float(last['entitled']):.2f}"
+        )
+    return f"For theta_F = {theta}, finest pair, observed / corrected / entitled: {', '.join(parts)}."
