@@ -44,7 +44,7 @@ class Comparison:
 
 
 class ExactErrors:
-    """Distance of a state to exact fields by quadrature of degree 9.
+    """Distance of a state to exact fields by quadrature of degree 7.
 
     `w`, `theta` map positions (points, d) and time to (points, d) or (points,); `gradient` maps to (points, d, d), the
     derivative of component i along axis j at [i, j], of u.
@@ -59,7 +59,7 @@ class ExactErrors:
         gradient: Callable[[Array, float], Array],
     ) -> None:
         quadrature = _core.LoadQuadrature2 if discretisation.dim == 2 else _core.LoadQuadrature3
-        self._rule = quadrature(discretisation.layout, None, 5)
+        self._rule = quadrature(discretisation.layout, None, 4)
         self._exact = w, theta, gradient
 
     def of(self, stepper: Any) -> dict[str, float]:

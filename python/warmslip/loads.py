@@ -34,7 +34,7 @@ class Loads:
     contact_flux: Data = 0.0
     gap: Data = 0.0
     foundation_temperature: Data = 0.0
-    points: int = 4
+    points: int = 3
 
     @classmethod
     def of(cls, scene: Scene) -> Loads:

@@ -104,6 +104,11 @@ class Discretisation:
         flat = _core.stress(self.mesh, self.problem.material, u, w, theta)
         return np.asarray(flat).reshape(-1, self.dim, self.dim)
 
+    def mises(self, stepper: Any) -> Array:
+        """Von Mises stress of a stepper's state, (cells,). Collective."""
+        u, w, theta = (self.field(getattr(stepper, name)) for name in ("u", "w", "theta"))
+        return von_mises(self.stress(u, w, theta))
+
 
 def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, mesh: Any = None) -> Discretisation:
     """Assembles a scene on a communicator (default: all ranks). `loads` replaces the scene's, `mesh` its structured mesh.
@@ -142,3 +147,19 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
     vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d)
     return Discretisation(scene, loads, mesh, problem, layout, _d("Operators", d)(layout, problem), surface, _d("Norms", d)(layout), vectors)
 
+
+def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
+    """L2 norm and maximum of the von Mises stress of a stepper's state, at the cells' centroids (collective)."""
+    mises = d.mises(stepper)
+    x = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
+    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if d.dim == 2 else 6)
+    return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
+
+
+def von_mises(stress: Array) -> Array:
+    """sqrt(3/2 s:s) with s the deviator of the stress, its missing row and column zero for d = 2 (plane stress): (cells,)."""
+    full = np.zeros((len(stress), 3, 3))
+    d = stress.shape[1]
+    full[:, :d, :d] = stress
+    deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))

@@ -178,6 +178,7 @@ def run(
                     progress(done, scene.time.steps, report)
             if job.stepper.cost.steps > written:
                 writer.state(job.stepper)
+            writer.fields(job.stepper)
     summary = job.summary()
     if folder is not None and rank == 0:
         (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")

@@ -17,7 +17,7 @@ import numpy as np
 
 from warmslip import _core, provenance
 from warmslip.errors import Comparison, Largest
-from warmslip.problem import Discretisation, discretise
+from warmslip.problem import Discretisation, discretise, stress_measures
 from warmslip.run import IDENTITIES, Run, petsc_options
 from warmslip.scene import Scene, SceneError
 
@@ -30,24 +30,6 @@ def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int
         return [(n, n) for n in levels]
     sizes = [*levels, reference]
     return [(n, m) for n in sizes for m in sizes if (n, m) != (reference, reference)]
-
-
-def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
-    """L2 norm of the von Mises stress (of the elementwise constant stress at the centroids), and its maximum."""
-    u, w, theta = (d.field(getattr(stepper, name)) for name in ("u", "w", "theta"))
-    mises = von_mises(d.stress(u, w, theta))
-    x = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
-    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if d.dim == 2 else 6)
-    return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
-
-
-def von_mises(stress: Any) -> Any:
-    """sqrt(3/2 s:s) with s the deviator of the stress, its missing row and column zero for d = 2 (plane stress): (cells,)."""
-    full = np.zeros((len(stress), 3, 3))
-    d = stress.shape[1]
-    full[:, :d, :d] = stress
-    deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    return np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator))
 
 
 def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:

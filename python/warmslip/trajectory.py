@@ -89,6 +89,12 @@ class TrajectoryWriter:
         self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
         self._append("contact/status", stepper.status)
 
+    def fields(self, stepper: Any) -> None:
+        """Writes the von Mises stress of the present state, (cells,) in `fields/mises` (collective)."""
+        mises = self._d.mises(stepper)
+        if self._file is not None:
+            self._file["fields/mises"] = mises
+
     def __enter__(self) -> Self:
         return self
 

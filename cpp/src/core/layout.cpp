@@ -88,14 +88,22 @@ void Layout<d>::partition(std::vector<Index>& cells, std::vector<PetscInt>& owne
   const auto cell_count = static_cast<PetscInt>(root ? mesh_->cells.rows() : 0);
   const auto node_count = static_cast<PetscInt>(root ? mesh_->nodes.rows() : 0);
   DmHandle serial, distributed;
-  WARMSLIP_PETSC(DMPlexCreateFromCellListPetsc(comm_, d, cell_count, node_count, d + 1, PETSC_FALSE, corners.data(), d,
+  WARMSLIP_PETSC(DMPlexCreateFromCellListPetsc(comm_, d, cell_count, node_count, d + 1, PETSC_TRUE, corners.data(), d,
                                                mesh_->nodes.data(), serial.out()));
   WARMSLIP_PETSC(DMSetOptionsPrefix(serial, "mesh_"));
+  WARMSLIP_PETSC(DMPlexDistributeSetDefault(serial, PETSC_FALSE));  // options must not distribute it behind our back
   WARMSLIP_PETSC(DMSetFromOptions(serial));
   const SectionHandle before = point_section(serial);
-  std::vector<PetscInt> numbers;
-  for (PetscInt c = 0; c < cell_count; ++c) numbers.push_back(c);
-  for (PetscInt i = 0; i < node_count; ++i) numbers.push_back(i);
+  PetscInt begin, end, chart;
+  WARMSLIP_PETSC(PetscSectionGetChart(before, nullptr, &chart));
+  std::vector<PetscInt> numbers(static_cast<std::size_t>(chart), -1);  // edges and faces keep the -1
+  const auto count_from_first = [&](PetscInt first, PetscInt last) {
+    for (PetscInt p = first; p < last; ++p) numbers[static_cast<std::size_t>(p)] = p - first;
+  };
+  WARMSLIP_PETSC(DMPlexGetHeightStratum(serial, 0, &begin, &end));
+  count_from_first(begin, end);
+  WARMSLIP_PETSC(DMPlexGetDepthStratum(serial, 0, &begin, &end));
+  count_from_first(begin, end);
   SfHandle migration;
   WARMSLIP_PETSC(DMPlexDistribute(serial, 0, migration.out(), distributed.out()));
 
@@ -108,7 +116,6 @@ void Layout<d>::partition(std::vector<Index>& cells, std::vector<PetscInt>& owne
     WARMSLIP_PETSC(PetscSectionGetOffset(after, point, &offset));
     return static_cast<Index>(moved[offset]);
   };
-  PetscInt begin, end;
   WARMSLIP_PETSC(DMPlexGetHeightStratum(distributed, 0, &begin, &end));
   for (PetscInt p = begin; p < end; ++p) cells.push_back(number(p));
   WARMSLIP_PETSC(DMPlexGetDepthStratum(distributed, 0, &begin, &end));

@@ -20,9 +20,10 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double terms = point.displacement.norm() + std::abs(point.gap) + problem.step * velocity.template segment<d>(at).norm();
     rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
   }
-  *floor = largest > 0 ? rounding / largest : 0;
-  if (largest == 0) return 0;
+  *floor = 0;
   if (!std::isfinite(largest) || !std::isfinite(fastest)) return std::numeric_limits<double>::infinity();
+  if (largest <= rounding) return 0;  // no contact force that rounding would let one tell from none
+  *floor = rounding / largest;
   const double bound_scale = mu > 0 ? mu * largest : largest;
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {

@@ -77,9 +77,10 @@ def errors(inputs: list[Path]) -> tuple[Figure, str]:
     said = [spoken(table, case(path).theta) for table, path in zip(tables, inputs, strict=True)]
     reference = max(int(line["n"]) for line in rows(inputs[0]))
     head = (
-        f"Reading '{case(inputs[0]).reading}', {case(inputs[0]).coupling} coupling: estimated errors against h + k as in "
-        f"the paper's figure 5, h = k from 1/{tables[0][0]['n']} to 1/{tables[0][-1]['n']}, the solution at 1/{reference} "
-        "standing in for the exact one. Ticks are the paper's where it has them, the grey band is the range of its ticks."
+        f"Reading '{case(inputs[0]).reading}', {case(inputs[0]).coupling} coupling: estimated errors against h + k as "
+        f"in the paper's figure 5, h = k from 1/{tables[0][0]['n']} to 1/{tables[0][-1]['n']}, the solution at "
+        f"1/{reference} standing in for the exact one. Ticks are the paper's where it has them, the grey band is the "
+        "range of its ticks."
     )
     return figure, " ".join([head, *said])
 
@@ -125,9 +126,9 @@ def corrected(inputs: list[Path]) -> tuple[Figure, str]:
     ]
     figure.legend(handles=[*names, *kinds], loc="outside lower center", ncols=6, columnspacing=1.1, handlelength=2)
     head = (
-        f"Reading '{case(studies[0]).reading}': orders between successive h = k. Dotted: as observed against the finest "
-        "solution, which flatters the last ones; solid: with that bias removed; wide pale lines: the order that the "
-        "problem is entitled to."
+        f"Reading '{case(studies[0]).reading}': orders between successive h = k. Dotted: as observed against the "
+        "finest solution, which flatters the last ones; solid: with that bias removed; wide pale lines: the order "
+        "that the problem is entitled to."
     )
     return figure, " ".join([head, *said])
 

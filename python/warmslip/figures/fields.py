@@ -178,5 +178,5 @@ def missing(path: Path) -> Array:
 
 def caption(runs: list[Final], what: str, lines: list[str]) -> str:
     scene = runs[0].scene
-    head = f"{scene.title}: {what}, at t = {runs[0].time:g} (h = 1/{scene.mesh.counts[0]}, k = {number(scene.step)})."
+    head = f"{scene.title}: {what}, at t = {runs[0].time:g} (h = 1/{scene.mesh.counts[0]}, k = 1/{1 / scene.step:g})."
     return " ".join([head, *lines])

@@ -131,8 +131,8 @@ def caption(scene: Scene, temperatures: list[float]) -> str:
     )
     return (
         f"{scene.title}: the setting, drawn from the scene. The body is clamped at the "
-        f"{' and '.join(scene.supports.displacement)}, loaded by the tractions {loads} (arrows to scale), and rests on a "
-        f"foundation at temperature {' or '.join(f'{t:g}' for t in temperatures)} with normal compliance "
+        f"{' and '.join(scene.supports.displacement)}, loaded by the tractions {loads} (arrows to scale), and rests on "
+        f"a foundation at temperature {' or '.join(f'{t:g}' for t in temperatures)} with normal compliance "
         f"c_nu = {c.stiffness:g}, friction coefficient {c.friction.coefficient:g}, gap {c.gap:g} and heat exchange "
         f"k_c = {c.heat_exchange.conductance:g}."
     )

@@ -83,11 +83,11 @@ def column(table: list[dict[str, str]], name: str) -> np.ndarray[Any, np.dtype[n
     return np.array([float(line[name] or "nan") for line in table])
 
 
-def number(value: float) -> str:
-    """Three digits, as people write them: 0.0123, 1.23e-5, 1e12."""
+def number(value: float, digits: int = 3) -> str:
+    """A number as people write it: 0.0123, 1.23e-5, 1e12."""
     if not np.isfinite(value):
         return "-"
-    mantissa, e, exponent = f"{value:.3g}".partition("e")
+    mantissa, e, exponent = f"{value:.{digits}g}".partition("e")
     return mantissa + (f"e{int(exponent)}" if e else "")
 
 

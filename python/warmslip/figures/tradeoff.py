@@ -61,8 +61,9 @@ def work(inputs: list[Path]) -> tuple[Figure, str]:
     handles.append(Line2D([], [], color=INK, lw=1, label="front, with 1/h, 1/k"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     head = (
-        f"Error (largest over time, sum of u, w and theta) against the CPU seconds of a run, set-up included: {len(lines)} "
-        "runs. The front joins the runs than which no other of the same problem is both cheaper and more accurate."
+        f"Error (largest over time, sum of u, w and theta) against the CPU seconds of a run, set-up included: "
+        f"{len(lines)} runs. The front joins the runs than which no other of the same "
+        "problem is both cheaper and more accurate."
     )
     return figure, " ".join([head, *filter(None, said)])
 
@@ -82,6 +83,7 @@ def panel(ax: Any, lines: list[dict[str, str]], cases: dict[str, Case], title: s
             mew=0.4,
         )
     grid_lines(ax)
+    ax.margins(0.1, 0.08)
     front = sorted(
         (line for line in lines if line["front"].lower() == "true"), key=lambda line: float(line["cpu_seconds"])
     )

@@ -1,0 +1,253 @@
+"""The command line: run a scene, measure, judge and draw. Every error is one sentence a problem and a non-zero exit."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from warmslip import scene as scenes
+from warmslip.scene import Scene, SceneError
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+console = Console(stderr=True)
+
+SceneName = Annotated[str, typer.Argument(help="a scene of the library by name, or the path of a TOML file")]
+Set = Annotated[list[str] | None, typer.Option("--set", help="table.key=value, any number of times")]
+Csv = Annotated[Path, typer.Option(help="the CSV file to write; its stamp goes beside it as .json")]
+Tables = Annotated[list[Path], typer.Argument(help="tables written by `warmslip study`")]
+
+
+def _levels(text: str) -> list[int]:
+    try:
+        levels = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--levels '{text}' is not a list of integers; write 16,32,64") from None
+    if not levels or any(level < 1 for level in levels):
+        raise SceneError(f"--levels '{text}' needs positive integers; write 16,32,64")
+    return levels
+
+
+def _bar(rank: int = 0) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
+    return Progress(*columns, console=console, disable=rank != 0 or not console.is_terminal)
+
+
+@app.command()
+def run(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(help="folder for trajectory.h5 and summary.json")],
+    set_: Set = None,
+    backend: Annotated[str, typer.Option(help="automatic, cholmod or petsc")] = "automatic",
+) -> None:
+    """Run a scene. Exit code 0 when the outcome is right, 1 when it is not, 2 when the scene cannot be run."""
+    import warmslip
+
+    checked = scenes.load(scene, set_)
+    if backend not in ("automatic", "cholmod", "petsc"):
+        raise SceneError(f"--backend '{backend}' is unknown; use automatic, cholmod or petsc")
+    from mpi4py import MPI
+
+    rank = MPI.COMM_WORLD.rank
+    with _bar(rank) as bar:
+        task = bar.add_task("stepping", total=checked.time.steps, note="")
+
+        def progress(step: int, steps: int, report: Any) -> None:
+            bar.update(task, completed=step, note=f"open {report.open} stick {report.stick} slip {report.slip}")
+
+        result = warmslip.run(checked, out=out, backend=backend, progress=progress)
+    if rank == 0:
+        worst = max(result.summary["identities"][i] for i in ("energy", "heat", "force", "law"))
+        typer.echo(f"{result.outcome}: {result.summary['steps']} steps, worst identity {worst:.1e}, see {out}/summary.json")
+    if not result.right:
+        raise typer.Exit(1)
+
+
+@app.command()
+def study(
+    scene: SceneName,
+    out: Csv,
+    levels: Annotated[str, typer.Option(help="1/h and 1/k of the members")] = "16,32,64,128",
+    reference: Annotated[int, typer.Option(help="1/h = 1/k of the solution taken as exact")] = 256,
+    grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
+    set_: Set = None,
+) -> None:
+    """Measure an h,k refinement study against its finest solution."""
+    from warmslip import study as studies
+
+    checked = scenes.load(scene, set_)
+    if grid not in ("diagonal", "full"):
+        raise SceneError(f"--grid '{grid}' is unknown; use diagonal or full")
+    with _bar() as bar:
+        task = bar.add_task(out.stem, total=reference, note="")
+        rows = studies.study(
+            checked, levels=_levels(levels), reference=reference, grid=grid, progress=lambda n, _: bar.update(task, completed=n)
+        )
+    studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid))
+
+
+@app.command()
+def manufactured(
+    out: Csv,
+    levels: Annotated[str, typer.Option(help="1/h of the meshes")] = "8,16,32,64",
+    set_: Set = None,
+) -> None:
+    """Measure the orders on a manufactured solution with contact and slip: h = k for every coupling, k = h^2 staggered."""
+    from warmslip import manufactured as made
+    from warmslip import study as studies
+
+    checked = scenes.load("paper_isotropic", set_)
+    rows = made.table(checked, ["staggered", "lagged", "monolithic"], _levels(levels), "h=k")
+    rows += made.table(checked, ["staggered"], _levels(levels), "k=h^2")
+    studies.write(out, rows, studies.stamp(checked, levels=levels))
+
+
+@app.command()
+def extremes(
+    out: Csv,
+    n: Annotated[int, typer.Option(help="bricks a side")] = 16,
+    steps: Annotated[int, typer.Option(help="time steps")] = 16,
+    scene: Annotated[str, typer.Option(help="the scene whose parameters climb the ladders")] = "paper_isotropic",
+    set_: Set = None,
+) -> None:
+    """Climb the ladders of extreme parameters and say what became of every run."""
+    from warmslip import extremes as ladders
+    from warmslip import study as studies
+
+    checked = scenes.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])])
+    studies.write(out, ladders.table(checked), studies.stamp(checked))
+
+
+def _derived(out: Path, rows: list[dict[str, Any]], sources: list[Path]) -> None:
+    from warmslip import provenance
+    from warmslip import study as studies
+
+    studies.write(out, rows, provenance.stamp(sources=[p.name for p in sources]))
+
+
+@app.command()
+def rates(tables: Tables, out: Csv) -> None:
+    """Observed, bias-corrected and entitled orders of studies."""
+    from warmslip import rates as orders
+
+    rows = [row for path in tables for row in orders.table(path, _scene_of(path))]
+    _derived(out, rows, tables)
+
+
+def _scene_of(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
+
+
+@app.command()
+def readings(tables: Tables, out: Csv) -> None:
+    """Which reading of the paper satisfies which of its claims."""
+    from warmslip import readings as claims
+
+    _derived(out, claims.table(tables), tables)
+
+
+@app.command()
+def work(tables: Tables, out: Csv) -> None:
+    """Work against precision of every run of studies, with the front."""
+    from warmslip import work as precision
+
+    _derived(out, precision.table(tables), tables)
+
+
+@app.command()
+def judge(
+    out: Annotated[Path, typer.Option(help="the verdict to write, JSON")],
+    expected: Annotated[Path, typer.Option(help="stored values, JSON")],
+    studies: Annotated[list[Path] | None, typer.Option(help="a study's table, any number of times")] = None,
+    manufactured: Annotated[Path | None, typer.Option()] = None,
+    readings: Annotated[Path | None, typer.Option()] = None,
+    extremes: Annotated[Path | None, typer.Option()] = None,
+    fail: Annotated[bool, typer.Option(help="exit 1 when a check fails")] = True,
+    record: Annotated[bool, typer.Option(help="overwrite the stored values with the measured ones, for review")] = False,
+) -> None:
+    """Compare measured tables with bands and stored values; always writes the verdict."""
+    from warmslip import judge as court
+
+    def verdict() -> dict[str, Any]:
+        return court.verdict(
+            studies=studies or [], manufactured_table=manufactured, readings=readings, extremes=extremes, expected=court.load(expected)
+        )
+
+    result = verdict()
+    if record:
+        expected.write_text(json.dumps(court.record(result), indent=1) + "\n")
+        result = verdict()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(json.dumps(result, indent=1) + "\n")
+    typer.echo(f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks")
+    for name in result["failed"]:
+        detail = next(d for d in result["details"] if d["name"] == name)
+        typer.echo(f"  {name}: {detail['value']} not in [{detail['low']}, {detail['high']}]", err=True)
+    if fail and not result["passed"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def draw(
+    kind: Annotated[str, typer.Argument(help="which figure")],
+    inputs: Annotated[list[Path], typer.Argument(help="tables or trajectories it is drawn from")],
+    out: Annotated[Path, typer.Option(help="the PNG to write; its caption goes beside it as .rst")],
+) -> None:
+    """Draw a figure from tables."""
+    from warmslip import figures
+
+    figures.draw(kind, inputs, out)
+
+
+@app.command("list")
+def list_() -> None:
+    """List the scenes of the library."""
+    for name in scenes.library():
+        typer.echo(f"{name:18s} {scenes.load(name).title}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of scene files."""
+    typer.echo(json.dumps(Scene.model_json_schema(), indent=2))
+
+
+def main() -> None:
+    """Entry point: expected errors become one line and exit code 2; anything else keeps its traceback under WARMSLIP_DEBUG."""
+    try:
+        app(standalone_mode=True)
+    except (SceneError, ValueError) as error:
+        _stop(str(error), 2)
+    except OSError as error:
+        _stop(f"{error.strerror}: {error.filename}; check the path", 2)
+    except (RuntimeError, MemoryError) as error:
+        if os.environ.get("WARMSLIP_DEBUG"):
+            raise
+        _stop(str(error) or "out of memory; use a coarser mesh", 1)
+    except Exception:
+        # a rank that fails alone would leave the others waiting for ever
+        if int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1"))) > 1:
+            from mpi4py import MPI
+
+            console.print_exception()
+            MPI.COMM_WORLD.Abort(1)
+        raise
+
+
+def _stop(message: str, code: int) -> None:
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.rank == 0:
+        for line in message.splitlines():
+            console.print(f"[red]error:[/red] {line}", highlight=False, soft_wrap=True, markup=True)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Ladders of one parameter each, to its extremes, on the paper's problem: every run must say what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from warmslip.run import IDENTITIES, IDENTITY_BOUND, Run
+from warmslip.scene import Scene, SceneError
+
+Overrides = dict[str, Any]
+
+
+def _key(name: str) -> Callable[[Any], Overrides]:
+    return lambda value: {name: value}
+
+
+def _steps(k: float) -> Overrides:
+    # a few steps of the size asked for: what happens at size k, not what happens until T
+    return {"time.steps": max(1, min(8, round(1 / k))), "time.end": min(1.0, 8 * k) if k < 1 else k}
+
+
+def _matrix(a: float, b: float) -> list[list[float]]:
+    return [[a, b], [b, a]]
+
+
+LADDERS: dict[str, tuple[Callable[[Any], Overrides], list[Any]]] = {
+    "stiffness c_nu": (_key("contact.stiffness"), [0.0, 1.0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12]),
+    "friction mu_tau": (_key("contact.friction.coefficient"), [0.0, 0.01, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]),
+    "time step k": (_steps, [1e3, 1.0, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-5]),
+    "viscosity": (lambda v: {"viscosity.lame": [v, v / 2]}, [10.0, 1.0, 1e-1, 1e-2, 1e-4, 1e-8, 0.0]),
+    "density rho": (_key("inertia.density"), [1e6, 1e2, 1.0, 1e-2, 1e-6, 0.0]),
+    "no viscosity, density rho": (lambda v: {"viscosity.lame": [0.0, 0.0], "inertia.density": v}, [1e2, 1.0, 1e-2, 1e-6, 0.0]),
+    "conductance k_c": (_key("contact.heat_exchange.conductance"), [0.0, 1e-3, 1.0, 1e3, 1e6, 1e12]),
+    "foundation theta_F": (_key("contact.heat_exchange.foundation_temperature"), [-1e3, 0.0, 10.0, 1e2, 1e4, 1e6]),
+    "conductivity, off-diagonal": (lambda v: {"heat.conductivity": _matrix(1.0, v)}, [0.0, 0.9, 0.999999, 1.0]),
+    "conductivity, size": (lambda v: {"heat.conductivity": _matrix(v, 0.0)}, [0.0, 1e-6, 1e-3, 1.0, 1e3, 1e6]),
+    "stretched mesh, length": (lambda v: {"mesh.lengths": [v, 1.0]}, [1e-4, 1e-2, 1.0, 1e2, 1e4]),
+    "coupling R = M times": (lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(v, 0.0)}, [0.0, 1.0, 10.0, 100.0]),
+    "coupling R = -M times": (lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(-v, 0.0)}, [1.0, 10.0, 100.0]),
+    "gap g": (_key("contact.gap"), [-0.1, -1e-12, 0.0, 1e-12, 1e-3, 0.1]),
+}
+
+
+def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
+    """One run at one value: its outcome, the worst of each identity, and a verdict.
+
+    `right`: every identity and the contact law within 1e-9 beyond the round-off floor c_nu eps |u| / p of the law;
+    `stopped`: a named outcome, the last good state kept; `refused`: before it started, with a reason; `WRONG`: none of these.
+    """
+    make, _ = LADDERS[ladder]
+    line: dict[str, Any] = {"ladder": ladder, "value": value, "outcome": "", "reason": ""}
+    blank = dict.fromkeys([*IDENTITIES, "law_floor"], float("nan")) | {"newton_largest": 0, "stage": "", "steps": 0}
+    try:
+        job = Run(scene.override(**make(value)))
+    except (SceneError, ValueError) as refusal:
+        return line | blank | {"outcome": "refused", "reason": str(refusal).replace(",", ";").replace("\n", " "), "verdict": "refused"}
+    for _ in job.steps():
+        pass
+    line |= {"outcome": job.outcome} | job.worst | {"law_floor": job.floor, "newton_largest": job.newton_max}
+    line |= {"stage": max(job.stages, key=lambda s: ("none", "newton", "line_search", "fixed_point", "enumeration").index(s)), "steps": job.stepper.cost.steps}
+    within = max(job.worst.values()) <= IDENTITY_BOUND + job.floor
+    verdict = ("right" if within else "WRONG") if job.outcome == "right" else "stopped"
+    return line | {"verdict": verdict}
+
+
+def table(scene: Scene, progress: Callable[[str, Any], None] | None = None) -> list[dict[str, Any]]:
+    """Every ladder on `scene`."""
+    out = []
+    for ladder, (_, values) in LADDERS.items():
+        for value in values:
+            if progress:
+                progress(ladder, value)
+            out.append(cell(scene, ladder, value))
+    return out

@@ -1,0 +1,116 @@
+"""Orders of convergence from tables of errors: observed, corrected for the self-reference, and entitled."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from warmslip.errors import SUMS, TERMS
+
+Row = dict[str, Any]
+
+# an energy-norm error is orthogonal to the finer space: its square adds up, the others' values do
+QUADRATIC = {"u_V"}
+
+
+def read(path: Path) -> list[Row]:
+    """A CSV table with numbers where they are numbers."""
+    with path.open() as file:
+        return [{key: _number(value) for key, value in row.items()} for row in csv.DictReader(file)]
+
+
+def _number(text: str) -> Any:
+    try:
+        return float(text) if any(c in text for c in ".einf") else int(text)
+    except ValueError:
+        return {"True": True, "False": False}.get(text, text)
+
+
+def observed(coarse: float, fine: float, ratio: float = 2.0) -> float:
+    """log(coarse/fine)/log(ratio); nan when either error is not positive."""
+    return float(np.log(coarse / fine) / np.log(ratio)) if coarse > 0 and fine > 0 else float("nan")
+
+
+def corrected(coarse: float, fine: float, h: float, reference: float, *, quadratic: bool) -> float:
+    """The order p of a true error C h^p that, measured against a solution of size `reference`, shows these two errors.
+
+    Measured against that solution the error is C (h^p - reference^p), or the root of the same with squares when the
+    errors are orthogonal, so a plain ratio flatters: a true first order shows 1.58 at the last halving of 1/16 .. 1/128
+    against 1/256. `h` belongs to `coarse`, h/2 to `fine`. nan when no p in (0.02, 8) fits.
+    """
+    r = h / reference
+    target = (coarse / fine) ** (2 if quadratic else 1)
+
+    def mismatch(p: float) -> float:
+        q = 2 * p if quadratic else p
+        return float((r**q - 1) / ((r / 2) ** q - 1) - target)
+
+    try:
+        return float(brentq(mismatch, 0.02, 8.0))
+    except ValueError:
+        return float("nan")
+
+
+def least_squares(h: Iterable[float], errors: Iterable[float]) -> tuple[float, float]:
+    """Order and root mean square misfit of log(error) = p log(h) + c over a grid."""
+    x, y = np.log(np.array(list(h))), np.log(np.array(list(errors)))
+    (p, c), *_ = np.linalg.lstsq(np.stack([x, np.ones_like(x)], axis=1), y, rcond=None)
+    return float(p), float(np.sqrt(np.mean((y - p * x - c) ** 2)))
+
+
+def williams_exponent(lam: float, mu: float, angle: float = np.pi / 2) -> float:
+    """Smallest singular exponent of u ~ r^L at a clamped-free corner, for the plane Lame pair (lam, mu).
+
+    M. L. Williams, J. Appl. Mech. 19, 1952: sin^2(L angle) = (c+1)^2/(4c) - L^2 sin^2(angle)/c, c = (lam+3mu)/(lam+mu).
+    """
+    c = (lam + 3 * mu) / (lam + mu)
+
+    def equation(exponent: float) -> float:
+        side = (c + 1) ** 2 / (4 * c) - exponent**2 * np.sin(angle) ** 2 / c
+        return float(np.sin(exponent * angle) ** 2 - side)
+
+    grid = np.linspace(1e-3, 2.0, 2000)
+    values = [equation(x) for x in grid]
+    for left, right, a, b in zip(grid, grid[1:], values, values[1:], strict=False):
+        if a * b <= 0:
+            return float(brentq(equation, left, right))
+    return 1.0
+
+
+def entitled(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tuple[float, float]) -> float:
+    """The order in h = k that the paper's scene is entitled to, by term (verification notes, section 4).
+
+    |u|_V is held back by the clamped-free corners, |theta|_L2 by theta_F = 10 against theta_0 = 0 (O(k^(3/4)) in the
+    maximum over time) or by a singular K (a jump across x = y, O(h^(1/2))), which |u|_V then inherits.
+    """
+    theta = 0.5 if singular_conductivity else 0.75 if hot else 1.0
+    u = min(williams_exponent(*viscosity), 1.0, theta if singular_conductivity else 1.0)
+    single = {"u_V": u, "w_L2": min(1.0, 2 * u), "theta_L2": theta}
+    return single[term] if term in single else min(single[one] for one in SUMS[term])
+
+
+def table(path: Path, scene: Row) -> list[Row]:
+    """Orders along the diagonal h = k of one study; `scene` is the resolved scene of its stamp."""
+    rows = read(path)
+    reference = rows[-1]["h"]
+    diagonal = sorted((r for r in rows[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
+    singular = abs(np.linalg.det(np.array(scene["heat"]["conductivity"]))) < 1e-12
+    hot = scene["contact"]["heat_exchange"]["foundation_temperature"] != scene["initial"]["temperature"]
+    out: list[Row] = []
+    for term in [*TERMS, *SUMS]:
+        limit = entitled(term, hot=hot, singular_conductivity=singular, viscosity=tuple(scene["viscosity"]["lame"]))
+        before: Row | None = None
+        for line in diagonal:
+            error = line[f"e_{term}"]
+            p = q = float("nan")
+            if before is not None:
+                p = observed(before[f"e_{term}"], error, before["h"] / line["h"])
+                q = corrected(before[f"e_{term}"], error, before["h"], reference, quadratic=term in QUADRATIC)
+            out.append({"case": path.stem, "term": term, "h": line["h"], "error": error, "observed": p, "corrected": q, "entitled": limit})
+            before = line
+    return out
