@@ -15,7 +15,7 @@ from warmslip.scene import Scene, SceneError, load
 if TYPE_CHECKING:
     from warmslip.loads import Loads
     from warmslip.problem import Discretisation, discretise
-    from warmslip.run import Result, Run, run
+    from warmslip.runner import Result, Run, run
     from warmslip.trajectory import Trajectory
 
 __all__ = ["Discretisation", "Loads", "Result", "Run", "Scene", "SceneError", "Trajectory", "discretise", "load", "run"]
@@ -25,9 +25,9 @@ _LAZY = {
     "Loads": "loads",
     "Discretisation": "problem",
     "discretise": "problem",
-    "Result": "run",
-    "Run": "run",
-    "run": "run",
+    "Result": "runner",
+    "Run": "runner",
+    "run": "runner",
     "Trajectory": "trajectory",
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from warmslip.run import IDENTITIES, IDENTITY_BOUND, Run
+from warmslip.runner import IDENTITIES, IDENTITY_BOUND, Run
 from warmslip.scene import Scene, SceneError
 
 Overrides = dict[str, Any]
@@ -54,7 +54,7 @@ def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
     try:
         job = Run(scene.override(**make(value)))
     except (SceneError, ValueError) as refusal:
-        return line | blank | {"outcome": "refused", "reason": str(refusal).replace(",", ";").replace("\n", " "), "verdict": "refused"}
+        return line | blank | {"outcome": "refused", "reason": str(refusal).replace("\n", " "), "verdict": "refused"}
     for _ in job.steps():
         pass
     line |= {"outcome": job.outcome} | job.worst | {"law_floor": job.floor, "newton_largest": job.newton_max}

@@ -9,7 +9,7 @@ from typing import Any
 
 from warmslip import rates
 from warmslip.errors import SUMS, TERMS
-from warmslip.run import IDENTITIES
+from warmslip.runner import IDENTITIES
 
 # orders on smooth data: h = k gives 1 everywhere, k = h^2 gives 1 in V and 2 in L2
 ENTITLED = {"h=k": dict.fromkeys(TERMS, 1.0), "k=h^2": {"u_V": 1.0, "w_L2": 2.0, "theta_L2": 2.0}}

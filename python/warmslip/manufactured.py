@@ -20,7 +20,7 @@ from warmslip import rates
 from warmslip.errors import TERMS, ExactErrors, Largest
 from warmslip.loads import Array, Loads
 from warmslip.problem import mandel
-from warmslip.run import Run
+from warmslip.runner import Run
 from warmslip.scene import Scene
 
 X, Y, T = sp.symbols("x y t", real=True)

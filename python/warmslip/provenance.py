@@ -36,10 +36,11 @@ def cpu_model() -> str:
 
 @cache
 def fingerprint() -> str:
-    """A hash of everything that computes: the compiled core and the Python layers below the figures."""
+    """A hash of everything that solves: the compiled core and the Python modules that step it."""
     digest = hashlib.sha256()
     compiled = sorted(PACKAGE.parent.parent.glob("build/cp*/_core.*.so")) or sorted(PACKAGE.glob("_core.*.so"))
-    sources = sorted(p for p in PACKAGE.glob("*.py") if p.name not in {"cli.py", "__init__.py"})
+    afterwards = {"cli", "__init__", "rates", "readings", "work", "judge"}
+    sources = sorted(p for p in PACKAGE.glob("*.py") if p.stem not in afterwards)
     for path in [*compiled, *sources, *sorted(PACKAGE.glob("scenes/*.toml"))]:
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -6,6 +6,7 @@ the reference is measured and its maximum kept. Members on one mesh share their 
 
 from __future__ import annotations
 
+import csv
 import json
 import resource
 from collections.abc import Callable
@@ -18,7 +19,7 @@ import numpy as np
 from warmslip import _core, provenance
 from warmslip.errors import Comparison, Largest
 from warmslip.problem import Discretisation, discretise, stress_measures
-from warmslip.run import IDENTITIES, Run, petsc_options
+from warmslip.runner import IDENTITIES, Run, petsc_options
 from warmslip.scene import Scene, SceneError
 
 
@@ -119,7 +120,8 @@ def stamp(scene: Scene, **more: Any) -> dict[str, Any]:
 def write(path: Path, table: list[dict[str, Any]], record: dict[str, Any]) -> None:
     """The table as CSV with 17 digits, and its stamp beside it as .json."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = [",".join(table[0])]
-    lines += [",".join(f"{value:.17g}" if isinstance(value, float) else str(value) for value in line.values()) for line in table]
-    path.write_text("\n".join(lines) + "\n")
+    with path.open("w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(table[0])
+        out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in line.values()] for line in table)
     path.with_suffix(".json").write_text(json.dumps(record, indent=2) + "\n")
