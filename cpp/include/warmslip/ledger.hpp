@@ -33,9 +33,27 @@ struct StepInputs {
   const Eigen::VectorXd& contact_free;    ///< velocity the points would have without contact, for the law's scale
 };
 
-/// Closes the books of the step from `before` to `after`.
 template <int d>
-Ledger close(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-             const ContactSurface<d>& surface, const Level& before, const Level& after, const StepInputs& inputs);
+class Bookkeeper {
+ public:
+  Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface);
+
+  /// Closes the books of the step from `before` to `after` (collective).
+  Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+
+ private:
+  void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  double heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void resultants(const Level& before, const Level& after, const StepInputs& inputs, double heat_energy, Ledger& ledger);
+
+  const Layout<d>& layout_;
+  const Problem<d>& problem_;
+  const Operators<d>& operators_;
+  const ContactSurface<d>& surface_;
+  VecHandle viscous_w_, conducted_, exchanged_, contact_force_;  // B w, D theta, J theta, E lambda
+  std::vector<PetscInt> unknowns_;                               // of contact, relative to the owned range
+  std::vector<bool> clamped_, cooled_;                           // a node
+};
 
 }  // namespace warmslip

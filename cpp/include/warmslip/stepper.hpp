@@ -81,6 +81,7 @@ class Stepper {
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
   StepperOptions options_;
+  Bookkeeper<d> books_;
   double coupled_scale_ = 1;
   std::unique_ptr<Factor> momentum_, heat_;   // monolithic: momentum_ holds both fields
   std::unique_ptr<ContactSolver<d>> contact_;

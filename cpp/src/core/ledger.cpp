@@ -46,108 +46,127 @@ struct Resultant {
 }  // namespace
 
 template <int d>
-Ledger close(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-             const ContactSurface<d>& surface, const Level& before, const Level& after, const StepInputs& in) {
-  const double rho = problem.material.density, k = in.k;
-  Ledger l{};
-  const VecHandle viscous_w = duplicate(after.w), conducted = duplicate(after.theta), exchanged = duplicate(after.theta);
-  WARMSLIP_PETSC(MatMult(operators.viscosity, after.w, viscous_w));
-  WARMSLIP_PETSC(MatMult(operators.conductivity, after.theta, conducted));
-  WARMSLIP_PETSC(MatMult(operators.exchange, after.theta, exchanged));
+Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface)
+    : layout_(layout), problem_(problem), operators_(operators), surface_(surface), viscous_w_(layout.vector(d)),
+      conducted_(layout.vector(1)), exchanged_(layout.vector(1)), contact_force_(layout.vector(d)), unknowns_(surface.unknowns(d)) {
+  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
+  for (PetscInt& i : unknowns_) i -= first * d;
+  clamped_.resize(static_cast<std::size_t>(layout.owned()));
+  cooled_.resize(clamped_.size());
+  for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
+  for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+}
 
-  // energy, tested with k w_n
+template <int d>
+Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
+  Ledger ledger{};
+  WARMSLIP_PETSC(MatMult(operators_.viscosity, after.w, viscous_w_));
+  WARMSLIP_PETSC(MatMult(operators_.conductivity, after.theta, conducted_));
+  WARMSLIP_PETSC(MatMult(operators_.exchange, after.theta, exchanged_));
+  contact(before, after, in, ledger);
+  energy(before, after, in, ledger);
+  resultants(before, after, in, heat(before, after, in, ledger), ledger);
+  return ledger;
+}
+
+// The contact terms, from the law at u_n and not from the solver's forces.
+template <int d>
+void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+  const Eigen::VectorXd w_points = surface_.at_points(surface_.nodal_values(after.w));
+  const auto& law = problem_.law;
+  ContactProblem<d> problem{law, in.k, {}, in.contact_free};
+  double stored_before = 0;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
+    const Point<d> u0 = before.contact_u.segment<d>(i * d), u1 = after.contact_u.segment<d>(i * d);
+    const double weight = surface_.weights()[i];
+    const double r1 = u1.dot(nu) - after.gap[i], r0 = u0.dot(nu) - after.gap[i], r_old = u0.dot(nu) - before.gap[i];
+    l.contact += weight * law.compliance.energy(r1);
+    stored_before += weight * law.compliance.energy(r_old);
+    l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
+    l.contact_damping += weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
+    l.friction += in.k * weight * law.bound(r1) * (w - w.dot(nu) * nu).norm();
+    problem.points.push_back({nu, weight, r0, u0, after.gap[i]});
+  }
+  l.contact_change = l.contact - stored_before;
+  l.law_residual = law_residual(problem, in.contact_force, w_points, &l.law_floor);
+}
+
+// Momentum tested with k w_n.
+template <int d>
+void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+  const double rho = problem_.material.density;
   const double kinetic_before = 0.5 * rho * dot(before.w, before.mass_w), elastic_before = 0.5 * dot(before.u, before.elastic_u);
   l.kinetic = 0.5 * rho * dot(after.w, after.mass_w);
   l.elastic = 0.5 * dot(after.u, after.elastic_u);
   l.kinetic_change = l.kinetic - kinetic_before;
   l.elastic_change = l.elastic - elastic_before;
-  l.inertia_damping = 0.5 * rho * dot_of_changes(layout, after.w, before.w, after.mass_w, before.mass_w);
-  l.elastic_damping = 0.5 * dot_of_changes(layout, after.u, before.u, after.elastic_u, before.elastic_u);
-  l.viscous = k * dot(after.w, viscous_w);
-  l.load_work = k * dot(in.force, after.w);
-  l.expansion_work = k * dot(in.expansion_theta, after.w);
-
-  // the contact terms, from the law at u_n and not from the solver's forces
-  const Eigen::VectorXd w_points = surface.at_points(surface.nodal_values(after.w));
-  const auto& law = problem.law;
-  ContactProblem<d> contact{law, k, {}, in.contact_free};
-  double contact_before = 0;
-  for (Eigen::Index i = 0; i < surface.points(); ++i) {
-    const Point<d> nu = surface.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
-    const Point<d> u0 = before.contact_u.segment<d>(i * d), u1 = after.contact_u.segment<d>(i * d);
-    const double weight = surface.weights()[i];
-    const double r1 = u1.dot(nu) - after.gap[i], r0 = u0.dot(nu) - after.gap[i], r_old = u0.dot(nu) - before.gap[i];
-    l.contact += weight * law.compliance.energy(r1);
-    contact_before += weight * law.compliance.energy(r_old);
-    l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
-    l.contact_damping += weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
-    l.friction += k * weight * law.bound(r1) * (w - w.dot(nu) * nu).norm();
-    contact.points.push_back({nu, weight, r0, u0, after.gap[i]});
-  }
-  l.contact_change = l.contact - contact_before;
+  l.inertia_damping = 0.5 * rho * dot_of_changes(layout_, after.w, before.w, after.mass_w, before.mass_w);
+  l.elastic_damping = 0.5 * dot_of_changes(layout_, after.u, before.u, after.elastic_u, before.elastic_u);
+  l.viscous = in.k * dot(after.w, viscous_w_);
+  l.load_work = in.k * dot(in.force, after.w);
+  l.expansion_work = in.k * dot(in.expansion_theta, after.w);
   l.energy_residual = relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
                                    l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work,
-                               {l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before, l.viscous,
-                                l.friction, l.load_work, l.expansion_work, l.gap_work});
-  l.law_residual = law_residual(contact, in.contact_force, w_points, &l.law_floor);
+                               {l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, l.contact - l.contact_change,
+                                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work});
+}
 
-  // heat, tested with k theta_n
-  const double heat_before = 0.5 * dot(before.theta, before.mass_theta), heat = 0.5 * dot(after.theta, after.mass_theta);
-  l.heat_change = heat - heat_before;
-  l.heat_damping = 0.5 * dot_of_changes(layout, after.theta, before.theta, after.mass_theta, before.mass_theta);
-  l.conducted = k * dot(after.theta, conducted);
-  l.exchanged = k * dot(after.theta, exchanged);
-  l.supplied = k * dot(in.heat, after.theta);
-  l.heating = k * dot(in.heating_w, after.theta);
-  const double heat_energy = relative(l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating,
-                                      {heat, heat_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating});
+// The heat balance tested with k theta_n; returns its relative residual.
+template <int d>
+double Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+  const double stored_before = 0.5 * dot(before.theta, before.mass_theta), stored = 0.5 * dot(after.theta, after.mass_theta);
+  l.heat_change = stored - stored_before;
+  l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
+  l.conducted = in.k * dot(after.theta, conducted_);
+  l.exchanged = in.k * dot(after.theta, exchanged_);
+  l.supplied = in.k * dot(in.heat, after.theta);
+  l.heating = in.k * dot(in.heating_w, after.theta);
+  return relative(l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating,
+                  {stored, stored_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating});
+}
 
-  // heat content (eta = 1), force and moment (v rigid): the supports' reactions are the residuals of the fixed rows
-  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
-  std::vector<bool> cooled(static_cast<std::size_t>(layout.owned())), clamped(cooled.size());
-  for (const PetscInt i : operators.cooled) cooled[static_cast<std::size_t>(i - first)] = true;
-  for (const PetscInt i : operators.clamped) clamped[static_cast<std::size_t>(i / d - first)] = true;
-  const VecHandle contact_force = duplicate(after.w);
+// Heat content (eta = 1), force and moment (v rigid): the supports' reactions are the residuals of the fixed rows.
+template <int d>
+void Bookkeeper<d>::resultants(const Level& before, const Level& after, const StepInputs& in, double heat_energy, Ledger& l) {
+  const double rho = problem_.material.density, k = in.k;
   {
-    const Eigen::VectorXd nodal = surface.to_nodes(in.contact_force);
-    const auto unknowns = surface.unknowns(d);
-    Values out(contact_force);
-    for (std::size_t i = 0; i < unknowns.size(); ++i) {
-      const PetscInt row = unknowns[i] - first * d;
-      if (row >= 0 && row < layout.owned() * d) (*out)[row] = nodal[static_cast<Eigen::Index>(i)];
-    }
+    const Eigen::VectorXd nodal = surface_.to_nodes(in.contact_force);
+    Values out(contact_force_);
+    for (std::size_t i = 0; i < unknowns_.size(); ++i)
+      if (unknowns_[i] >= 0 && unknowns_[i] < layout_.owned() * d) (*out)[unknowns_[i]] = nodal[static_cast<Eigen::Index>(i)];
   }
   Resultant<d> force;
   double content = 0, content_size = 0;
   {
-    Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w), g(in.expansion_theta), c(contact_force);
-    Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted), x(exchanged);
-    for (PetscInt i = 0; i < layout.owned(); ++i) {
-      const Point<d> position = layout.mesh().nodes.row(layout.mesh_nodes()[static_cast<std::size_t>(i)]).transpose();
+    Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta), c(contact_force_);
+    Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_);
+    for (PetscInt i = 0; i < layout_.owned(); ++i) {
+      const auto node = static_cast<std::size_t>(i);
+      const Point<d> position = layout_.mesh().nodes.row(layout_.mesh_nodes()[node]).transpose();
       const auto at = [&](Values& v) -> Point<d> { return (*v).template segment<d>(i * d); };
       const Point<d> inertia = rho / k * (at(m1) - at(m0)), load = at(f), contact_here = at(c);
       force.add(position, inertia);
       force.add(position, -load);
       force.add(position, contact_here);
-      if (clamped[static_cast<std::size_t>(i)]) force.add(position, -(inertia - load + contact_here + at(b) + at(e) - at(g)));
+      if (clamped_[node]) force.add(position, -(inertia - load + contact_here + at(b) + at(e) - at(g)));
       const double storage = ((*t1)[i] - (*t0)[i]) / k, exchange = (*x)[i], source = (*q)[i] + (*h)[i];
       content += storage + exchange - source;
       content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
-      if (cooled[static_cast<std::size_t>(i)]) {
+      if (cooled_[node]) {
         const double wall = storage + exchange - source + (*flux)[i];
         content -= wall;
         content_size += std::abs(wall);
       }
     }
   }
-  const Eigen::VectorXd sums = layout.sum(Eigen::VectorXd(force.sum)), sizes = layout.sum(Eigen::VectorXd(force.size));
+  const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)), sizes = layout_.sum(Eigen::VectorXd(force.size));
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], {sizes.maxCoeff()}));
-  l.heat_residual = std::max(heat_energy, relative(layout.sum(content), {layout.sum(content_size)}));
-  return l;
+  l.heat_residual = std::max(heat_energy, relative(layout_.sum(content), {layout_.sum(content_size)}));
 }
 
-template Ledger close<2>(const Layout<2>&, const Problem<2>&, const Operators<2>&, const ContactSurface<2>&, const Level&, const Level&, const StepInputs&);
-template Ledger close<3>(const Layout<3>&, const Problem<3>&, const Operators<3>&, const ContactSurface<3>&, const Level&, const Level&, const StepInputs&);
+template class Bookkeeper<2>;
+template class Bookkeeper<3>;
 
 }  // namespace warmslip

@@ -39,7 +39,8 @@ std::pair<double, Symmetry> coupled_symmetry(const Material<d>& m) {
 template <int d>
 Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                     const ContactSurface<d>& surface, StepperOptions options)
-    : layout_(layout), problem_(problem), operators_(operators), surface_(surface), options_(options) {
+    : layout_(layout), problem_(problem), operators_(operators), surface_(surface), options_(options),
+      books_(layout, problem, operators, surface) {
   if (!(options.k > 0) || !std::isfinite(options.k)) throw std::invalid_argument("the time step must be positive and finite");
   const Timed timed(cost_.setup_seconds);
   if (options.coupling == Coupling::monolithic) {
@@ -205,8 +206,8 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   products(next_);
   if (monolithic) heating_w = next_.heating_w;
   const Vec expansion_theta = monolithic ? next_.expansion_theta : now_.expansion_theta;
-  report.ledger = close(layout_, problem_, operators_, surface_, now_, next_,
-                        {options_.k, loads.force, loads.heat, expansion_theta, heating_w, contact.force, surface_.at_points(free)});
+  report.ledger = books_.close(now_, next_,
+                               {options_.k, loads.force, loads.heat, expansion_theta, heating_w, contact.force, surface_.at_points(free)});
   const Ledger& l = report.ledger;
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.conducted + l.heat_change)) {
     report.outcome = Outcome::not_finite;

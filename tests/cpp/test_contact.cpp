@@ -1,0 +1,182 @@
+// The contact law at one point and the solver on small bodies given by their compliance alone.
+#include <doctest/doctest.h>
+
+#include <random>
+
+#include "warmslip/contact_solver.hpp"
+
+using namespace warmslip;
+
+namespace {
+
+using Two = std::integral_constant<int, 2>;
+using Three = std::integral_constant<int, 3>;
+
+struct Random {
+  explicit Random(unsigned seed) : engine(seed) {}
+  std::mt19937 engine;
+  double operator()() { return std::normal_distribution<double>()(engine); }
+  template <int d>
+  Point<d> point() {
+    Point<d> p;
+    for (int a = 0; a < d; ++a) p[a] = (*this)();
+    return p;
+  }
+};
+
+template <int d>
+struct Body {
+  Eigen::MatrixXd compliance;
+  ContactProblem<d> problem;
+};
+
+/// A random symmetric positive definite compliance and random data, some points open, some closed.
+template <int d>
+Body<d> random_body(unsigned seed, int points, double friction, double stiffness = 100) {
+  Random random(seed);
+  const Eigen::Index n = points * d;
+  Eigen::MatrixXd root(n, n);
+  for (double& entry : root.reshaped()) entry = random();
+  Body<d> body{root * root.transpose() / n + Eigen::MatrixXd::Identity(n, n), {{{stiffness}, {friction}}, 0.1, {}, Eigen::VectorXd(n)}};
+  for (double& entry : body.problem.free) entry = random();
+  for (int i = 0; i < points; ++i) {
+    const Point<d> normal = random.point<d>().normalized(), displacement = 0.1 * random.point<d>();
+    const double gap = 0.05 * random();
+    body.problem.points.push_back({normal, 0.5 + 0.1 * i, displacement.dot(normal) - gap, displacement, gap});
+  }
+  return body;
+}
+
+/// How far a solution is from (2.8), (2.9), written down anew: force per weight against pressure, bound and direction.
+template <int d>
+double defect(const Body<d>& body, const ContactSolution<d>& s) {
+  const Eigen::VectorXd velocity = body.problem.free - body.compliance * s.force;
+  double worst = (velocity - s.velocity).norm();
+  for (std::size_t i = 0; i < body.problem.points.size(); ++i) {
+    const auto& point = body.problem.points[i];
+    const auto row = static_cast<Eigen::Index>(i) * d;
+    const Point<d> f = s.force.template segment<d>(row) / point.weight, w = velocity.template segment<d>(row);
+    const double p = body.problem.law.compliance.stiffness *
+                     std::max(0.0, (point.displacement + body.problem.step * w).dot(point.normal) - point.gap);
+    const Point<d> lambda = f - f.dot(point.normal) * point.normal, slip = w - w.dot(point.normal) * point.normal;
+    const double bound = body.problem.law.friction.coefficient * p;
+    worst = std::max({worst, std::abs(f.dot(point.normal) - p), lambda.norm() - bound,
+                      std::abs(lambda.dot(slip) - bound * slip.norm())});
+  }
+  return worst;
+}
+
+ContactOptions only(int newton, int fixed_point, int enumerate) {
+  ContactOptions options;
+  options.newton_steps = newton;
+  options.fixed_point_steps = fixed_point;
+  options.enumerate_points = enumerate;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite difference", D, Two, Three) {
+  constexpr int d = D::value;
+  const ContactLaw law{{50}, {0.4}};
+  const double k = 0.2, alpha = 0.3, beta = 0.7, step = 1e-6;
+  Random random(3);
+  std::array<int, 3> seen{};
+  for (int trial = 0; trial < 400; ++trial) {
+    const ContactPoint<d> point{random.point<d>().normalized(), 0.5, 0.2 * random() + 0.1, Point<d>::Zero(), 0};
+    const Point<d> f = 2 * random.point<d>(), w = random.point<d>();
+    const auto at = [&](const Point<d>& force, const Point<d>& velocity) { return residual<d>(law, point, k, alpha, beta, force, velocity); };
+    const auto here = at(f, w);
+    Tensor2<d> by_force, by_velocity;
+    bool kink = false;
+    for (int a = 0; a < d; ++a) {
+      const Point<d> e = step * Point<d>::Unit(a);
+      const auto f1 = at(f + e, w), f0 = at(f - e, w), w1 = at(f, w + e), w0 = at(f, w - e);
+      for (const auto* side : {&f1, &f0, &w1, &w0}) kink = kink || side->status != here.status;
+      by_force.col(a) = (f1.value - f0.value) / (2 * step);
+      by_velocity.col(a) = (w1.value - w0.value) / (2 * step);
+    }
+    if (kink) continue;
+    ++seen[static_cast<std::size_t>(here.status)];
+    CHECK((by_force - here.by_force).norm() <= 1e-7 * (1 + here.by_force.norm()));
+    CHECK((by_velocity - here.by_velocity).norm() <= 1e-7 * (1 + here.by_velocity.norm()));
+  }
+  for (const int count : seen) CHECK(count > 20);
+}
+
+TEST_CASE_TEMPLATE("the residual vanishes exactly on the law", D, Two, Three) {
+  constexpr int d = D::value;
+  const ContactLaw law{{50}, {0.4}};
+  const ContactPoint<d> point{-Point<d>::Unit(d - 1), 0.5, 0.1, Point<d>::Zero(), 0};
+  const double p = 0.5 * 50 * 0.1, k = 0.2;
+  const Point<d> nu = point.normal, tau = Point<d>::Unit(0), still = Point<d>::Zero();
+  const auto size = [&](const Point<d>& f, const Point<d>& w) { return residual<d>(law, point, k, 0.3, 0.7, f, w).value.norm(); };
+  CHECK(size(p * nu + 0.3 * p * tau, still) <= 1e-14);        // sticks
+  CHECK(size(p * nu + 0.4 * p * tau, 2 * tau) <= 1e-14);      // slips, the body's force on the foundation along w
+  CHECK(size(p * nu - 0.4 * p * tau, 2 * tau) > 0.1);         // friction that pushes
+  CHECK(size(p * nu + 0.5 * p * tau, still) > 0.1);           // beyond the cone
+  CHECK(size(p * nu + 0.3 * p * tau, 2 * tau) > 0.1);         // slips below the bound
+  CHECK(size(still, -k * 10 * nu) <= 1e-14);                  // open
+}
+
+TEST_CASE_TEMPLATE("random bodies: the law within 1e-12, whatever it takes", D, Two, Three) {
+  constexpr int d = D::value;
+  std::array<int, 3> statuses{};
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    const Body<d> body = random_body<d>(seed, 1 + static_cast<int>(seed % 12), seed % 4 * 0.15);
+    ContactSolver<d> solver(body.compliance);
+    const auto s = solver.solve(body.problem, Eigen::VectorXd::Zero(body.problem.free.size()));
+    CAPTURE(seed);
+    REQUIRE(s.converged);
+    CHECK(s.law_residual <= 1e-12 + s.floor);
+    CHECK(s.floor < 1e-12);
+    CHECK(defect(body, s) <= 1e-10);
+    double floor;
+    CHECK(law_residual(body.problem, s.force, s.velocity, &floor) <= 1e-12 + floor);
+    CHECK(law_residual<d>(body.problem, 1.001 * s.force, s.velocity, &floor) >= (s.force.norm() > 0 ? 1e-4 : 0));
+    for (const Status status : s.status) ++statuses[static_cast<std::size_t>(status)];
+    // again from the answer: nothing is left to do
+    CHECK(solver.solve(body.problem, s.force).iterations == 0);
+  }
+  for (const int count : statuses) CHECK(count > 10);
+}
+
+TEST_CASE("three points: Newton, fixed point and enumeration agree") {
+  for (unsigned seed = 100; seed < 130; ++seed) {
+    const Body<2> body = random_body<2>(seed, 1 + static_cast<int>(seed % 3), 0.2);
+    const Eigen::VectorXd guess = Eigen::VectorXd::Zero(body.problem.free.size());
+    ContactSolver<2> newton(body.compliance), slow(body.compliance, only(0, 20000, 0)), all(body.compliance, only(0, 0, 6));
+    const auto a = newton.solve(body.problem, guess), b = slow.solve(body.problem, guess), c = all.solve(body.problem, guess);
+    CAPTURE(seed);
+    REQUIRE(a.converged);
+    REQUIRE(b.converged);
+    REQUIRE(c.converged);
+    if (c.force.norm() > 0) {  // an open body is right from the start
+      CHECK(a.stage == Stage::newton);
+      CHECK(b.stage == Stage::fixed_point);
+      CHECK(c.stage == Stage::enumeration);
+    }
+    CHECK((a.force - c.force).norm() <= 1e-10 * (1 + c.force.norm()));
+    CHECK((b.force - c.force).norm() <= 1e-10 * (1 + c.force.norm()));
+    CHECK(defect(body, c) <= 1e-10);
+  }
+}
+
+TEST_CASE_TEMPLATE("failure is said and never thrown", D, Two, Three) {
+  constexpr int d = D::value;
+  Body<d> body = random_body<d>(7, 4, 0.3);
+  for (auto& point : body.problem.points) point.penetration = 1;
+  const Eigen::VectorXd guess = Eigen::VectorXd::Zero(4 * d);
+  const auto nothing = ContactSolver<d>(body.compliance, only(0, 0, 0)).solve(body.problem, guess);
+  CHECK_FALSE(nothing.converged);
+  CHECK(nothing.law_residual > 1e-3);
+  auto impossible = only(20, 200, 6);
+  impossible.tolerance = -1;
+  CHECK_FALSE(ContactSolver<d>(body.compliance, impossible).solve(body.problem, guess).converged);
+  const auto slow = ContactSolver<d>(body.compliance, only(0, 20000, 0)).solve(body.problem, guess);
+  CHECK(slow.converged);
+  CHECK(slow.stage == Stage::fixed_point);
+  body.problem.free[1] = NAN;
+  CHECK_FALSE(ContactSolver<d>(body.compliance).solve(body.problem, guess).converged);
+  CHECK_THROWS_AS(ContactSolver<d>(Eigen::MatrixXd::Identity(d, d + 1)), std::invalid_argument);
+}
