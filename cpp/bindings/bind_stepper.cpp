@@ -117,6 +117,7 @@ void bind_stepper(py::module_& m) {
   item("contact_seconds", &Cost::contact_seconds);
   item("heat_seconds", &Cost::heat_seconds);
   item("steps", &Cost::steps);
+  item("refinements", &Cost::refinements);
   item("substitutions", &Cost::substitutions);
   item("factorizations", &Cost::factorizations);
   item("dense_factorizations", &Cost::dense_factorizations);

@@ -1,8 +1,8 @@
 """warmslip: dynamic frictional contact of thermo-viscoelastic bodies, with its numbers proved.
 
-    import warmslip
-    scene = warmslip.load("paper_isotropic").override(**{"mesh.n": 64, "time.steps": 64})
-    result = warmslip.run(scene, out="results/runs/first")
+import warmslip
+scene = warmslip.load("paper_isotropic").override(**{"mesh.n": 64, "time.steps": 64})
+result = warmslip.run(scene, out="results/runs/first")
 """
 
 from __future__ import annotations

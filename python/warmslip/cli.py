@@ -35,7 +35,14 @@ def _levels(text: str) -> list[int]:
 
 
 def _bar(rank: int = 0) -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(), TextColumn("{task.fields[note]}"))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
     return Progress(*columns, console=console, disable=rank != 0 or not console.is_terminal)
 
 
@@ -64,7 +71,9 @@ def run(
         result = warmslip.run(checked, out=out, backend=backend, progress=progress)
     if rank == 0:
         worst = max(result.summary["identities"][i] for i in ("energy", "heat", "force", "law"))
-        typer.echo(f"{result.outcome}: {result.summary['steps']} steps, worst identity {worst:.1e}, see {out}/summary.json")
+        typer.echo(
+            f"{result.outcome}: {result.summary['steps']} steps, worst identity {worst:.1e}, see {out}/summary.json"
+        )
     if not result.right:
         raise typer.Exit(1)
 
@@ -87,7 +96,11 @@ def study(
     with _bar() as bar:
         task = bar.add_task(out.stem, total=reference, note="")
         rows = studies.study(
-            checked, levels=_levels(levels), reference=reference, grid=grid, progress=lambda n, _: bar.update(task, completed=n)
+            checked,
+            levels=_levels(levels),
+            reference=reference,
+            grid=grid,
+            progress=lambda n, _: bar.update(task, completed=n),
         )
     studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid))
 
@@ -169,14 +182,20 @@ def judge(
     readings: Annotated[Path | None, typer.Option()] = None,
     extremes: Annotated[Path | None, typer.Option()] = None,
     fail: Annotated[bool, typer.Option(help="exit 1 when a check fails")] = True,
-    record: Annotated[bool, typer.Option(help="overwrite the stored values with the measured ones, for review")] = False,
+    record: Annotated[
+        bool, typer.Option(help="overwrite the stored values with the measured ones, for review")
+    ] = False,
 ) -> None:
     """Compare measured tables with bands and stored values; always writes the verdict."""
     from warmslip import judge as court
 
     def verdict() -> dict[str, Any]:
         return court.verdict(
-            studies=studies or [], manufactured_table=manufactured, readings=readings, extremes=extremes, expected=court.load(expected)
+            studies=studies or [],
+            manufactured_table=manufactured,
+            readings=readings,
+            extremes=extremes,
+            expected=court.load(expected),
         )
 
     result = verdict()
@@ -185,7 +204,9 @@ def judge(
         result = verdict()
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(result, indent=1) + "\n")
-    typer.echo(f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks")
+    typer.echo(
+        f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
+    )
     for name in result["failed"]:
         detail = next(d for d in result["details"] if d["name"] == name)
         typer.echo(f"  {name}: {detail['value']} not in [{detail['low']}, {detail['high']}]", err=True)

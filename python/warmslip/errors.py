@@ -22,23 +22,23 @@ class Comparison:
         self._coarse, self._fine = coarse, fine
         # the same mesh needs no interpolation
         self._prolong = None if coarse.mesh is fine.mesh else _core.prolongation(coarse.mesh, fine.mesh)
+        self._errors = [fine.layout.vector(block) for block in (fine.dim, fine.dim, 1)]
 
     def difference(self, coarse: Any, fine: Any) -> dict[str, float]:
         """Errors of the state of stepper `coarse` against that of stepper `fine` (collective)."""
-        d = self._fine.dim
-        vectors = [fine.u.copy(), fine.w.copy(), fine.theta.copy()]
+        states = coarse.u, coarse.w, coarse.theta
         if self._prolong is None:
-            for vector, own in zip(vectors, (coarse.u, coarse.w, coarse.theta), strict=True):
-                vector.axpy(-1.0, own)
+            for error, state in zip(self._errors, states, strict=True):
+                state.copy(error)
         else:
-            parts = [self._coarse.layout.gather(v).reshape(len(self._coarse.mesh.nodes), -1) for v in (coarse.u, coarse.w, coarse.theta)]
-            values = self._prolong @ np.hstack(parts)
-            moved = self._fine.layout.vector(d), self._fine.layout.vector(d), self._fine.layout.vector(1)
-            columns = (values[:, :d], values[:, d : 2 * d], values[:, 2 * d])
-            for vector, space, part in zip(vectors, moved, columns, strict=True):
-                self._fine.layout.distribute(np.ascontiguousarray(part).ravel(), space)
-                vector.axpy(-1.0, space)
-        u, w, theta = vectors
+            nodes = len(self._coarse.mesh.nodes)
+            parts = [self._coarse.layout.gather(state).reshape(nodes, -1) for state in states]
+            values = np.split(self._prolong @ np.hstack(parts), np.cumsum([p.shape[1] for p in parts])[:-1], axis=1)
+            for error, part in zip(self._errors, values, strict=True):
+                self._fine.layout.distribute(np.ascontiguousarray(part).ravel(), error)
+        for error, state in zip(self._errors, (fine.u, fine.w, fine.theta), strict=True):
+            error.axpy(-1.0, state)
+        u, w, theta = self._errors
         norms = self._fine.norms
         return {"u_V": norms.v(u), "w_L2": norms.l2(w), "theta_L2": norms.l2(theta)}
 

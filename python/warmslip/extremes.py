@@ -30,14 +30,23 @@ LADDERS: dict[str, tuple[Callable[[Any], Overrides], list[Any]]] = {
     "time step k": (_steps, [1e3, 1.0, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-5]),
     "viscosity": (lambda v: {"viscosity.lame": [v, v / 2]}, [10.0, 1.0, 1e-1, 1e-2, 1e-4, 1e-8, 0.0]),
     "density rho": (_key("inertia.density"), [1e6, 1e2, 1.0, 1e-2, 1e-6, 0.0]),
-    "no viscosity, density rho": (lambda v: {"viscosity.lame": [0.0, 0.0], "inertia.density": v}, [1e2, 1.0, 1e-2, 1e-6, 0.0]),
+    "no viscosity, density rho": (
+        lambda v: {"viscosity.lame": [0.0, 0.0], "inertia.density": v},
+        [1e2, 1.0, 1e-2, 1e-6, 0.0],
+    ),
     "conductance k_c": (_key("contact.heat_exchange.conductance"), [0.0, 1e-3, 1.0, 1e3, 1e6, 1e12]),
     "foundation theta_F": (_key("contact.heat_exchange.foundation_temperature"), [-1e3, 0.0, 10.0, 1e2, 1e4, 1e6]),
     "conductivity, off-diagonal": (lambda v: {"heat.conductivity": _matrix(1.0, v)}, [0.0, 0.9, 0.999999, 1.0]),
     "conductivity, size": (lambda v: {"heat.conductivity": _matrix(v, 0.0)}, [0.0, 1e-6, 1e-3, 1.0, 1e3, 1e6]),
     "stretched mesh, length": (lambda v: {"mesh.lengths": [v, 1.0]}, [1e-4, 1e-2, 1.0, 1e2, 1e4]),
-    "coupling R = M times": (lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(v, 0.0)}, [0.0, 1.0, 10.0, 100.0]),
-    "coupling R = -M times": (lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(-v, 0.0)}, [1.0, 10.0, 100.0]),
+    "coupling R = M times": (
+        lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(v, 0.0)},
+        [0.0, 1.0, 10.0, 100.0],
+    ),
+    "coupling R = -M times": (
+        lambda v: {"heat.expansion.tensor": _matrix(v, 0.0), "heat.heating.tensor": _matrix(-v, 0.0)},
+        [1.0, 10.0, 100.0],
+    ),
     "gap g": (_key("contact.gap"), [-0.1, -1e-12, 0.0, 1e-12, 1e-3, 0.1]),
 }
 
@@ -58,7 +67,12 @@ def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
     for _ in job.steps():
         pass
     line |= {"outcome": job.outcome} | job.worst | {"law_floor": job.floor, "newton_largest": job.newton_max}
-    line |= {"stage": max(job.stages, key=lambda s: ("none", "newton", "line_search", "fixed_point", "enumeration").index(s)), "steps": job.stepper.cost.steps}
+    line |= {
+        "stage": max(
+            job.stages, key=lambda s: ("none", "newton", "line_search", "fixed_point", "enumeration").index(s)
+        ),
+        "steps": job.stepper.cost.steps,
+    }
     within = max(job.worst.values()) <= IDENTITY_BOUND + job.floor
     verdict = ("right" if within else "WRONG") if job.outcome == "right" else "stopped"
     return line | {"verdict": verdict}

@@ -54,11 +54,16 @@ def manufactured(path: Path, expected: dict[str, Any]) -> list[Check]:
             if (group, coupling, term) == ("h=k", "monolithic", "w_L2"):
                 # space and time errors are of one size on the coarse meshes and the slope bends: the last halving counts
                 order, misfit = lines[-1][f"order_{term}"], 0.0
-            checks += [Check(f"{name} order", order, p - BELOW, p + ABOVE), Check(f"{name} misfit", misfit, 0.0, MISFIT)]
+            checks += [
+                Check(f"{name} order", order, p - BELOW, p + ABOVE),
+                Check(f"{name} misfit", misfit, 0.0, MISFIT),
+            ]
             checks.append(near(f"{name} finest", errors[-1], expected.get(f"{name} finest")))
         worst = max(r[f"identity_{i}"] for r in lines for i in IDENTITIES)
         checks.append(Check(f"manufactured {group} {coupling} identities", worst, 0.0, IDENTITY))
-        checks.append(Check(f"manufactured {group} {coupling} slips everywhere", lines[-1]["open"] + lines[-1]["stick"], 0, 0))
+        checks.append(
+            Check(f"manufactured {group} {coupling} slips everywhere", lines[-1]["open"] + lines[-1]["stick"], 0, 0)
+        )
     return checks
 
 
@@ -84,26 +89,43 @@ def same(name: str, value: Any, stored: Any) -> Check:
 
 def words(path: Path, columns: tuple[str, ...], key: tuple[str, ...], expected: dict[str, Any]) -> list[Check]:
     """Columns of words equal to what is stored, a check a cell."""
-    names = [(f"{path.stem} {' '.join(str(r[k]) for k in key)} {c}", r[c]) for r in rates.read(path) for c in columns if c in r]
+    names = [
+        (f"{path.stem} {' '.join(str(r[k]) for k in key)} {c}", r[c])
+        for r in rates.read(path)
+        for c in columns
+        if c in r
+    ]
     return [same(name, value, expected.get(name)) for name, value in names]
 
 
 def verdict(
-    *, studies: list[Path], manufactured_table: Path | None, readings: Path | None, extremes: Path | None, expected: dict[str, Any]
+    *,
+    studies: list[Path],
+    manufactured_table: Path | None,
+    readings: Path | None,
+    extremes: Path | None,
+    expected: dict[str, Any],
 ) -> dict[str, Any]:
     """All checks; `passed` is their conjunction. `expected` maps check names to stored values."""
     checks = [check for path in studies for check in study(path, expected)]
     if manufactured_table:
         checks += manufactured(manufactured_table, expected)
     if readings:
-        columns = tuple(c for c in rates.read(readings)[0] if c.startswith(("ticks_", "linear_")) or c.endswith("_larger"))
+        columns = tuple(
+            c for c in rates.read(readings)[0] if c.startswith(("ticks_", "linear_")) or c.endswith("_larger")
+        )
         checks += words(readings, columns, ("reading",), expected)
     if extremes:
         silent = sum(r["verdict"] == "WRONG" for r in rates.read(extremes))
         checks.append(Check("extremes cells silently wrong", silent, 0, 0))
         checks += words(extremes, ("verdict",), ("ladder", "value"), expected)
     failed = [c.name for c in checks if not c.passed]
-    return {"passed": not failed, "checks": len(checks), "failed": failed, "details": [asdict(c) | {"passed": c.passed} for c in checks]}
+    return {
+        "passed": not failed,
+        "checks": len(checks),
+        "failed": failed,
+        "details": [asdict(c) | {"passed": c.passed} for c in checks],
+    }
 
 
 def record(result: dict[str, Any]) -> dict[str, Any]:

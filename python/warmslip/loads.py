@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,7 +63,9 @@ def evaluate(data: Data, x: Array, t: float, components: int) -> Array:
 class LoadVectors:
     """Load vectors (f, v) and (q, eta) and the gap at any time; what does not depend on time is assembled once."""
 
-    def __init__(self, layout: Any, surface: Any, loads: Loads, contact_part: str, conductance: float, dim: int) -> None:
+    def __init__(
+        self, layout: Any, surface: Any, loads: Loads, contact_part: str, conductance: float, dim: int
+    ) -> None:
         self._surface, self._loads = surface, loads
         quadrature = _core.LoadQuadrature2 if dim == 2 else _core.LoadQuadrature3
         rules: dict[tuple[str | None, int], Any] = {}
@@ -77,7 +78,9 @@ class LoadVectors:
             return rules[key]
 
         foundation = loads.foundation_temperature
-        heated: Data = (lambda x, t: conductance * foundation(x, t)) if callable(foundation) else conductance * foundation
+        heated: Data = (
+            (lambda x, t: conductance * foundation(x, t)) if callable(foundation) else conductance * foundation
+        )
         terms = [
             (True, None, loads.body),
             *((True, part, data) for part, data in loads.traction.items()),
@@ -87,25 +90,28 @@ class LoadVectors:
             (False, contact_part, heated),
             (False, contact_part, loads.contact_flux),
         ]
+        self._dim = dim
         self._constant = layout.vector(dim), layout.vector(1)
+        self._present = layout.vector(dim), layout.vector(1)
         self._moving: list[tuple[bool, Any, Data]] = []
         for mechanical, part, data in terms:
             if callable(data):
                 self._moving.append((mechanical, rule(part, data), data))
             elif np.any(data):
-                q = rule(part, data)
-                self._target(self._constant, mechanical).axpy(1.0, q.load(evaluate(data, q.positions, 0.0, dim if mechanical else 1)))
-        self._dim = dim
+                self._add(self._constant, mechanical, rule(part, data), data, 0.0)
 
-    @staticmethod
-    def _target(pair: tuple[Any, Any], mechanical: bool) -> Any:
-        return pair[0] if mechanical else pair[1]
+    def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float) -> None:
+        vector = rule.load(evaluate(data, rule.positions, t, self._dim if mechanical else 1))
+        (pair[0] if mechanical else pair[1]).axpy(1.0, vector)
+        vector.destroy()  # petsc4py would only mark it for a later collection
 
     def at(self, t: float) -> tuple[Any, Any, Array]:
-        """(force, heat, gap) at time t; the vectors must not be changed."""
+        """(force, heat, gap) at time t, valid until the next call; the vectors must not be changed."""
         pair = self._constant
         if self._moving:
-            pair = pair[0].copy(), pair[1].copy()
+            pair = self._present
+            for constant, present in zip(self._constant, self._present, strict=True):
+                constant.copy(present)
             for mechanical, rule, data in self._moving:
-                self._target(pair, mechanical).axpy(1.0, rule.load(evaluate(data, rule.positions, t, self._dim if mechanical else 1)))
+                self._add(pair, mechanical, rule, data, t)
         return *pair, evaluate(self._loads.gap, self._surface.positions, t, 1)[:, 0]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core
-from warmslip.loads import Array, LoadVectors, Loads, evaluate
+from warmslip.loads import Array, Loads, LoadVectors, evaluate
 from warmslip.scene import IsotropicTable, Scene
 
 
@@ -143,9 +143,21 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
     layout = _d("Layout", d)(comm, mesh)
     surface = _d("ContactSurface", d)(layout, problem)
     if len(surface.weights) == 0:
-        raise ValueError(f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one")
+        raise ValueError(
+            f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
+        )
     vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d)
-    return Discretisation(scene, loads, mesh, problem, layout, _d("Operators", d)(layout, problem), surface, _d("Norms", d)(layout), vectors)
+    return Discretisation(
+        scene,
+        loads,
+        mesh,
+        problem,
+        layout,
+        _d("Operators", d)(layout, problem),
+        surface,
+        _d("Norms", d)(layout),
+        vectors,
+    )
 
 
 def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:

@@ -111,6 +111,16 @@ def table(path: Path, scene: Row) -> list[Row]:
             if before is not None:
                 p = observed(before[f"e_{term}"], error, before["h"] / line["h"])
                 q = corrected(before[f"e_{term}"], error, before["h"], reference, quadratic=term in QUADRATIC)
-            out.append({"case": path.stem, "term": term, "h": line["h"], "error": error, "observed": p, "corrected": q, "entitled": limit})
+            out.append(
+                {
+                    "case": path.stem,
+                    "term": term,
+                    "h": line["h"],
+                    "error": error,
+                    "observed": p,
+                    "corrected": q,
+                    "entitled": limit,
+                }
+            )
             before = line
     return out

@@ -31,7 +31,13 @@ def figure_five(path: Path, term: str) -> dict[str, Any]:
     h, errors = curve(path, term)
     order, _ = rates.least_squares(h, errors)
     among = all(TICKS[0] <= e <= TICKS[1] for e in errors) and max(errors) > UPPER_TICK
-    return {"coarsest": errors[0], "finest": errors[-1], "order": order, "ticks": _yes(among), "linear": _yes(ALMOST_LINEAR[0] <= order <= ALMOST_LINEAR[1])}
+    return {
+        "coarsest": errors[0],
+        "finest": errors[-1],
+        "order": order,
+        "ticks": _yes(among),
+        "linear": _yes(ALMOST_LINEAR[0] <= order <= ALMOST_LINEAR[1]),
+    }
 
 
 def table(paths: list[Path], coupling: str = "staggered") -> list[dict[str, Any]]:

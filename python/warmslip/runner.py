@@ -50,8 +50,15 @@ def residuals(report: Any) -> dict[str, float]:
 class Run:
     """A scene being stepped: iterate `steps()`, or let `warmslip.run` do it."""
 
-    def __init__(self, scene: Scene, *, comm: Any = None, loads: Loads | None = None, backend: str = "automatic",
-                 discretisation: Discretisation | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        comm: Any = None,
+        loads: Loads | None = None,
+        backend: str = "automatic",
+        discretisation: Discretisation | None = None,
+    ) -> None:
         from mpi4py import MPI
 
         self._wall, self._cpu = time.perf_counter(), time.process_time()
@@ -182,5 +189,5 @@ def run(
     summary = job.summary()
     if folder is not None and rank == 0:
         (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
-    fields = [job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")]
-    return Result(summary, *fields, trajectory=path)
+    u, w, theta = (job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta"))
+    return Result(summary, u, w, theta, path)

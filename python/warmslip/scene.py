@@ -55,7 +55,9 @@ class MeshTable(Table):
         for key in ("n", "lengths"):
             value = getattr(self, key)
             if isinstance(value, list) and len(value) != self.dim:
-                raise ValueError(f"{key} has {len(value)} entries but a {self.shape} has {self.dim} axes; give {self.dim}")
+                raise ValueError(
+                    f"{key} has {len(value)} entries but a {self.shape} has {self.dim} axes; give {self.dim}"
+                )
         if self.dim == 3 and self.diagonal == "crisscross":
             raise ValueError("diagonal 'crisscross' exists for shape 'square' only; use 'right' or 'left'")
         return self
@@ -247,9 +249,15 @@ class Scene(Table):
                 found.append(f"{key}: the tensor must not be negative; it needs mu >= 0 and {d} lambda + 2 mu >= 0")
             stiff = stiff or mu > 0
         if not found and not stiff and self.inertia.density == 0:
-            found.append("inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them")
+            found.append(
+                "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
+            )
         k = self.heat.conductivity
-        if len(k) == d and all(len(row) == d for row in k) and _smallest_eigenvalue(k) < -1e-12 * max(abs(x) for r in k for x in r):
+        if (
+            len(k) == d
+            and all(len(row) == d for row in k)
+            and _smallest_eigenvalue(k) < -1e-12 * max(abs(x) for r in k for x in r)
+        ):
             found.append("heat.conductivity must not have a negative eigenvalue; heat would flow from cold to hot")
         return found
 

@@ -26,7 +26,9 @@ from warmslip.scene import Scene, SceneError
 def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int]]:
     """(1/h, steps) of the grid: `diagonal` has h = k, `full` every pair; the reference itself is not a member."""
     if any(reference % level for level in levels):
-        raise SceneError(f"levels {levels} do not divide the reference {reference}; meshes and times would not be nested")
+        raise SceneError(
+            f"levels {levels} do not divide the reference {reference}; meshes and times would not be nested"
+        )
     if grid == "diagonal":
         return [(n, n) for n in levels]
     sizes = [*levels, reference]
@@ -39,11 +41,21 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
     cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
     report = job.report
     return (
-        {"n": job.scene.mesh.counts[0], "steps": job.scene.time.steps, "h": 1 / job.scene.mesh.counts[0], "k": job.scene.step}
+        {
+            "n": job.scene.mesh.counts[0],
+            "steps": job.scene.time.steps,
+            "h": 1 / job.scene.mesh.counts[0],
+            "k": job.scene.step,
+        }
         | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
         | {"outcome": job.outcome}
         | {f"identity_{name}": job.worst[name] for name in IDENTITIES}
-        | {"norm_u_V": d.norms.v(s.u), "norm_u_L2": d.norms.l2(s.u), "norm_w_L2": d.norms.l2(s.w), "norm_theta_L2": d.norms.l2(s.theta)}
+        | {
+            "norm_u_V": d.norms.v(s.u),
+            "norm_u_L2": d.norms.l2(s.u),
+            "norm_w_L2": d.norms.l2(s.w),
+            "norm_theta_L2": d.norms.l2(s.theta),
+        }
         | stress_measures(d, s)
         | {
             "normal_force": report.normal_force if report else 0.0,
@@ -101,7 +113,9 @@ def study(
 def _next(steps: Any, run: Run) -> None:
     if next(steps, None) is None:
         m = run.scene
-        raise RuntimeError(f"the run with n = {m.mesh.n}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}")
+        raise RuntimeError(
+            f"the run with n = {m.mesh.n}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}"
+        )
 
 
 def stamp(scene: Scene, **more: Any) -> dict[str, Any]:

@@ -42,7 +42,9 @@ class TrajectoryWriter:
         file["contact/weights"] = discretisation.surface.weights
 
         def table(name: str, *shape: int, dtype: str = "f8") -> None:
-            file.create_dataset(name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(1 if shape else 1024, *shape))
+            file.create_dataset(
+                name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(1 if shape else 1024, *shape)
+            )
 
         table("states/time")
         table("states/u", nodes, d)
@@ -98,7 +100,9 @@ class TrajectoryWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._file is not None:
             self._file.close()
 

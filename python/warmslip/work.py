@@ -22,9 +22,23 @@ def table(paths: list[Path]) -> list[dict[str, Any]]:
     for path in paths:
         parts = path.stem.split("_")
         for line in rates.read(path)[:-1]:
-            keep = ("n", "steps", "cpu_seconds", "factor_bytes", "substitutions", "factorizations", "dense_factorizations", "newton_iterations")
+            keep = (
+                "n",
+                "steps",
+                "cpu_seconds",
+                "factor_bytes",
+                "substitutions",
+                "factorizations",
+                "dense_factorizations",
+                "newton_iterations",
+            )
             out.append(
-                {"case": path.stem, "problem": problem_of(path.stem), "coupling": parts[2], "quadrature": parts[3] if len(parts) > 3 else "nodal"}
+                {
+                    "case": path.stem,
+                    "problem": problem_of(path.stem),
+                    "coupling": parts[2],
+                    "quadrature": parts[3] if len(parts) > 3 else "nodal",
+                }
                 | {"error": line["e_u_w_theta"]}
                 | {key: line[key] for key in keep}
             )

@@ -166,8 +166,9 @@ class Contact:
         stiff = self.c_nu * self.k
         if self.tangent_status != self.status.tobytes():
             by_p, by_lam = self.W[:, closed] + self.W[:, closed - self.m] * sigma, self.W[:, stick]
-            tangent = np.block([[by_lam[stick], by_p[stick]],
-                                [stiff * by_lam[closed], stiff * by_p[closed] + np.eye(len(closed))]])
+            tangent = np.block(
+                [[by_lam[stick], by_p[stick]], [stiff * by_lam[closed], stiff * by_p[closed] + np.eye(len(closed))]]
+            )
             self.tangent, self.tangent_status = lu_factor(tangent, check_finite=False), self.status.tobytes()
         penetration = u_n + self.k * z[self.m :] - self.gap
         right = np.concatenate([z[stick], self.c_nu * penetration[closed - self.m]])
@@ -269,15 +270,30 @@ def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_
         levels.append((u, w, theta))
     seconds_loop = process_time() - clock
     u, w, theta = (np.array(field) for field in zip(*levels, strict=True))
-    return Result(parameters, u.reshape(-1, N, 2), w.reshape(-1, N, 2), theta, tractions[:, m:], tractions[:, :m], law,
-                  contact.iterations, contact.rescues, seconds_setup, seconds_loop)
+    return Result(
+        parameters,
+        u.reshape(-1, N, 2),
+        w.reshape(-1, N, 2),
+        theta,
+        tractions[:, m:],
+        tractions[:, :m],
+        law,
+        contact.iterations,
+        contact.rescues,
+        seconds_setup,
+        seconds_loop,
+    )
 
 
 def norms(n, u, w, theta):
     """dict(u_V, u_L2, w_L2, theta_L2) of nodal fields u, w (N, 2) and theta (N,), with |u|_V = |eps(u)|_L2."""
     M, strain = operators(n, "isotropic")["M"], _stiffness(n, 0.0, 1.0)
-    squares = dict(u_V=u.ravel() @ (strain @ u.ravel()), u_L2=np.sum(u * (M @ u)), w_L2=np.sum(w * (M @ w)),
-                   theta_L2=theta @ (M @ theta))
+    squares = dict(
+        u_V=u.ravel() @ (strain @ u.ravel()),
+        u_L2=np.sum(u * (M @ u)),
+        w_L2=np.sum(w * (M @ w)),
+        theta_L2=theta @ (M @ theta),
+    )
     return {name: float(np.sqrt(square)) for name, square in squares.items()}
 
 
@@ -297,12 +313,27 @@ def identities(result):
         stored0, stored = (c_nu / 2 * weights @ np.maximum(x, 0) ** 2 for x in (r0, r))
         p = c_nu * np.maximum(r, 0)
         energy = [  # new and old energy; dissipation of backward Euler, then of viscosity and friction; work
-            w @ mass @ w / 2, u @ A @ u / 2, stored, -w0 @ mass @ w0 / 2, -u0 @ A @ u0 / 2, -stored0,
-            (w - w0) @ mass @ (w - w0) / 2, (u - u0) @ A @ (u - u0) / 2, stored0 - stored - weights @ (p * (r0 - r)),
-            k * w @ ops["B"] @ w, k * run["mu"] * weights @ (p * abs(slip)),
-            -k * force @ w, -k * w @ ops["G"] @ theta_star]
+            w @ mass @ w / 2,
+            u @ A @ u / 2,
+            stored,
+            -w0 @ mass @ w0 / 2,
+            -u0 @ A @ u0 / 2,
+            -stored0,
+            (w - w0) @ mass @ (w - w0) / 2,
+            (u - u0) @ A @ (u - u0) / 2,
+            stored0 - stored - weights @ (p * (r0 - r)),
+            k * w @ ops["B"] @ w,
+            k * run["mu"] * weights @ (p * abs(slip)),
+            -k * force @ w,
+            -k * w @ ops["G"] @ theta_star,
+        ]
         heat = [
-            theta @ M @ theta / 2, -theta0 @ M @ theta0 / 2, (theta - theta0) @ M @ (theta - theta0) / 2,
-            k * theta @ (ops["D"] + ops["J"]) @ theta, -k * source @ theta, -k * theta @ ops["E"] @ w_star]
+            theta @ M @ theta / 2,
+            -theta0 @ M @ theta0 / 2,
+            (theta - theta0) @ M @ (theta - theta0) / 2,
+            k * theta @ (ops["D"] + ops["J"]) @ theta,
+            -k * source @ theta,
+            -k * theta @ ops["E"] @ w_star,
+        ]
         worst = np.maximum(worst, [abs(sum(terms)) / (max(map(abs, terms)) or 1.0) for terms in (energy, heat)])
     return tuple(worst.tolist())

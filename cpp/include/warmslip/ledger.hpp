@@ -29,8 +29,8 @@ struct StepInputs {
   double k;
   Vec force, heat;                     ///< load vectors
   Vec expansion_theta, heating_w;      ///< the ones the coupling used
-  const Eigen::VectorXd& contact_force;   ///< at the points, (d points)
-  const Eigen::VectorXd& contact_free;    ///< velocity the points would have without contact, for the law's scale
+  Eigen::VectorXd contact_force;          ///< at the points, (d points)
+  Eigen::VectorXd contact_free;           ///< velocity the points would have without contact, for the law's scale
 };
 
 template <int d>
@@ -40,6 +40,10 @@ class Bookkeeper {
 
   /// Closes the books of the step from `before` to `after` (collective).
   Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+
+  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response.
+  void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out) const;
+  void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out) const;
 
  private:
   void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);

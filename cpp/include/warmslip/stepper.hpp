@@ -16,6 +16,7 @@ struct StepperOptions {
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
+  double refinement = 2e-12;             ///< balances worse than this get one step of iterative refinement, relative
 };
 
 /// Load vectors of one step: `force` (f, v), `heat` (q, eta) with k_c theta_F on Gamma_C included, `gap` g (points).
@@ -41,7 +42,7 @@ struct StepReport {
 struct Cost {
   double setup_seconds = 0, step_seconds = 0;      ///< CPU of this process
   double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0;  ///< parts of step_seconds
-  int steps = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0, newton_iterations = 0;
+  int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0, newton_iterations = 0;
   double factor_bytes = 0;
 };
 
@@ -70,8 +71,11 @@ class Stepper {
  private:
   void momentum_right_side(const StepLoads& loads, Vec out);
   void products(Level& level) const;
-  bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, ContactSolution<d>& solution);
+  bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
+                     ContactSolution<d>& solution);
   void solve_heat(const StepLoads& loads, Vec heating_w, Vec theta);
+  StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
+  bool refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   static void zero(Vec v, const std::vector<PetscInt>& indices);
@@ -86,7 +90,8 @@ class Stepper {
   std::unique_ptr<Factor> momentum_, heat_;   // monolithic: momentum_ holds both fields
   std::unique_ptr<ContactSolver<d>> contact_;
   Level now_, next_;
-  VecHandle momentum_right_, heat_right_, coupled_right_, coupled_;
+  VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
+  Eigen::VectorXd free_;                      // velocity of the contact points without contact force
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   double time_ = 0;

@@ -166,6 +166,32 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
   l.heat_residual = std::max(heat_energy, relative(layout_.sum(content), {layout_.sum(content_size)}));
 }
 
+template <int d>
+void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
+  const double rate = problem_.material.density / in.k;
+  WARMSLIP_PETSC(VecCopy(in.force, out));
+  WARMSLIP_PETSC(VecAXPY(out, 1, in.expansion_theta));
+  WARMSLIP_PETSC(VecAXPY(out, -1, viscous_w_));
+  WARMSLIP_PETSC(VecAXPY(out, -1, after.elastic_u));
+  WARMSLIP_PETSC(VecAXPY(out, -1, contact_force_));
+  Values values(out), m1(after.mass_w), m0(before.mass_w);
+  *values -= rate * (*m1 - *m0);
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    if (clamped_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
+}
+
+template <int d>
+void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
+  WARMSLIP_PETSC(VecCopy(in.heat, out));
+  WARMSLIP_PETSC(VecAXPY(out, 1, in.heating_w));
+  WARMSLIP_PETSC(VecAXPY(out, -1, conducted_));
+  WARMSLIP_PETSC(VecAXPY(out, -1, exchanged_));
+  Values values(out), m1(after.mass_theta), m0(before.mass_theta);
+  *values -= (*m1 - *m0) / in.k;
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
+}
+
 template class Bookkeeper<2>;
 template class Bookkeeper<3>;
 

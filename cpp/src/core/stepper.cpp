@@ -1,5 +1,6 @@
 #include "warmslip/stepper.hpp"
 
+#include <algorithm>
 #include <ctime>
 
 namespace warmslip {
@@ -70,8 +71,8 @@ Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Op
     level->expansion_theta = layout.vector(d);
     level->heating_w = layout.vector(1);
   }
-  momentum_right_ = layout.vector(d);
-  heat_right_ = layout.vector(1);
+  for (VecHandle* v : {&momentum_right_, &correction_w_}) *v = layout.vector(d);
+  for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout.vector(1);
   contact_force_ = Eigen::VectorXd::Zero(surface.points() * d);
   cost_.factorizations = heat_ ? 2 : 1;
   cost_.factor_bytes = momentum_->bytes() + (heat_ ? heat_->bytes() : 0);
@@ -115,14 +116,15 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, Vec out) {
 }
 
 template <int d>
-bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, ContactSolution<d>& solution) {
+bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
+                               ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
-  ContactProblem<d> problem{problem_.law, options_.k, {}, surface_.at_points(free)};
+  ContactProblem<d> problem{problem_.law, options_.k, {}, free};
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), u = now_.contact_u.segment<d>(i * d);
     problem.points.push_back({nu, surface_.weights()[i], u.dot(nu) - loads.gap[i], u, loads.gap[i]});
   }
-  solution = contact_->solve(problem, contact_force_);
+  solution = contact_->solve(problem, guess);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   cost_.newton_iterations += solution.iterations;
@@ -158,6 +160,51 @@ void Stepper<d>::split(Vec coupled, Vec w, Vec theta) const {
   }
 }
 
+// What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.
+template <int d>
+StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>& contact) {
+  WARMSLIP_PETSC(VecWAXPY(next_.u, options_.k, next_.w, now_.u));
+  next_.gap = loads.gap;
+  const bool lagged = options_.coupling == Coupling::lagged, monolithic = options_.coupling == Coupling::monolithic;
+  const Vec heating_w = lagged ? now_.heating_w : next_.heating_w;
+  if (!monolithic) {
+    if (!lagged) WARMSLIP_PETSC(MatMult(operators_.heating, next_.w, next_.heating_w));
+    solve_heat(loads, heating_w, next_.theta);
+  }
+  products(next_);
+  const Vec expansion_theta = monolithic ? next_.expansion_theta : now_.expansion_theta;
+  return {options_.k, loads.force, loads.heat, expansion_theta, heating_w, contact.force, free_};
+}
+
+// One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
+// solved again with the free velocity it corrects. Needed where K is ill-conditioned: large steps on fine meshes.
+template <int d>
+bool Stepper<d>::refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact) {
+  const bool monolithic = options_.coupling == Coupling::monolithic;
+  books_.momentum_defect(now_, next_, inputs, momentum_right_);
+  if (monolithic) {
+    books_.heat_defect(now_, next_, inputs, heat_right_);
+    join(momentum_right_, heat_right_, coupled_right_);
+  }
+  const Eigen::VectorXd correction = surface_.at_points(momentum_->reduce(monolithic ? coupled_right_ : momentum_right_));
+  const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
+  const Eigen::VectorXd before = contact.force;
+  free_ = velocity + contact_->compliance() * before + correction;
+  ContactSolution<d> again;
+  if (!solve_contact(loads, free_, before, again)) return false;
+  momentum_->expand(surface_.to_nodes(again.force - before), monolithic ? coupled_ : correction_w_);
+  if (monolithic) {
+    split(coupled_, correction_w_, correction_theta_);
+    WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+  }
+  WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
+  again.iterations += contact.iterations;
+  again.stage = std::max(again.stage, contact.stage);
+  contact = std::move(again);
+  ++cost_.refinements;
+  return true;
+}
+
 template <int d>
 StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   if (loads.gap.size() != surface_.points()) throw std::invalid_argument("the gap needs one value a contact point");
@@ -166,7 +213,6 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   const int solves = momentum_->substitutions() + (heat_ ? heat_->substitutions() : 0);
   StepReport<d> report;
   ContactSolution<d> contact;
-  Eigen::VectorXd free;
   {
     const Timed part(cost_.momentum_seconds);
     momentum_right_side(loads, momentum_right_);
@@ -178,10 +224,10 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
       zero(heat_right_, operators_.cooled);
       join(momentum_right_, heat_right_, coupled_right_);
     }
-    free = momentum_->reduce(monolithic ? coupled_right_ : momentum_right_);
+    free_ = surface_.at_points(momentum_->reduce(monolithic ? coupled_right_ : momentum_right_));
   }
-  const bool finite = layout_.sum(free.allFinite() ? 0.0 : 1.0) == 0;
-  if (!finite || !solve_contact(loads, free, contact)) {
+  const bool finite = layout_.sum(free_.allFinite() ? 0.0 : 1.0) == 0;
+  if (!finite || !solve_contact(loads, free_, contact_force_, contact)) {
     report.outcome = finite ? Outcome::contact_not_converged : Outcome::not_finite;
     report.stage = contact.stage;
     report.newton_iterations = contact.iterations;
@@ -192,22 +238,13 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
     const Timed part(cost_.momentum_seconds);
     momentum_->expand(surface_.to_nodes(contact.force), monolithic ? coupled_ : next_.w);
     if (monolithic) split(coupled_, next_.w, next_.theta);
-    WARMSLIP_PETSC(VecWAXPY(next_.u, options_.k, next_.w, now_.u));
   }
-  Vec heating_w = now_.heating_w;
-  if (!monolithic) {
-    if (options_.coupling == Coupling::staggered) {
-      WARMSLIP_PETSC(MatMult(operators_.heating, next_.w, next_.heating_w));
-      heating_w = next_.heating_w;
-    }
-    solve_heat(loads, heating_w, next_.theta);
-  }
-  next_.gap = loads.gap;
-  products(next_);
-  if (monolithic) heating_w = next_.heating_w;
-  const Vec expansion_theta = monolithic ? next_.expansion_theta : now_.expansion_theta;
-  report.ledger = books_.close(now_, next_,
-                               {options_.k, loads.force, loads.heat, expansion_theta, heating_w, contact.force, surface_.at_points(free)});
+  const StepInputs inputs = complete(loads, contact);
+  report.ledger = books_.close(now_, next_, inputs);
+  if (std::max({report.ledger.energy_residual, report.ledger.force_residual, monolithic ? report.ledger.heat_residual : 0.0}) >
+          options_.refinement &&
+      refine(loads, inputs, contact))
+    report.ledger = books_.close(now_, next_, complete(loads, contact));
   const Ledger& l = report.ledger;
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.conducted + l.heat_change)) {
     report.outcome = Outcome::not_finite;

@@ -1,0 +1,1188 @@
+"""
+The compiled core of warmslip: meshes, operators on PETSc, the contact solver and the time stepper, for d = 2 and 3.
+"""
+from __future__ import annotations
+import collections.abc
+import mpi4py.MPI
+import numpy
+import numpy.typing
+import petsc4py.PETSc
+import scipy.sparse
+import typing
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress']
+class Diagonal:
+    """
+    Members:
+    
+      right
+    
+      left
+    
+      crisscross
+    """
+    __members__: typing.ClassVar[dict[str, Diagonal]]
+    crisscross: typing.ClassVar[Diagonal]
+    left: typing.ClassVar[Diagonal]
+    right: typing.ClassVar[Diagonal]
+    @typing.overload
+    def __eq__(self, other: Diagonal) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Diagonal) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Mesh2:
+    """
+    Simplicial mesh with named boundary parts.
+    """
+    @staticmethod
+    def box(counts: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"], lengths: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"], diagonal: Diagonal) -> Mesh2:
+        """
+        Box of counts[a] bricks along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
+        """
+    @staticmethod
+    def from_lists(nodes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], cells: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"], parts: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"]]) -> Mesh2:
+        """
+        Mesh from nodes (n, d), cells (c, d+1) and facets (f, d) by part; ValueError names the first faulty entry.
+        """
+    @property
+    def cells(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        """
+        (cells, d+1) node numbers.
+        """
+    @property
+    def dim(self) -> int:
+        ...
+    @property
+    def nodes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        (nodes, d) coordinates, length.
+        """
+    @property
+    def parts(self) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"]]:
+        """
+        Facets (f, d) of every named boundary part.
+        """
+class Mesh3:
+    """
+    Simplicial mesh with named boundary parts.
+    """
+    @staticmethod
+    def box(counts: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], lengths: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], diagonal: Diagonal) -> Mesh3:
+        """
+        Box of counts[a] bricks along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
+        """
+    @staticmethod
+    def from_lists(nodes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], cells: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 4]"], parts: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"]]) -> Mesh3:
+        """
+        Mesh from nodes (n, d), cells (c, d+1) and facets (f, d) by part; ValueError names the first faulty entry.
+        """
+    @property
+    def cells(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]"]:
+        """
+        (cells, d+1) node numbers.
+        """
+    @property
+    def dim(self) -> int:
+        ...
+    @property
+    def nodes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (nodes, d) coordinates, length.
+        """
+    @property
+    def parts(self) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]]:
+        """
+        Facets (f, d) of every named boundary part.
+        """
+class Material2:
+    """
+    Density and the constant tensors of (2.1)-(2.4); fourth-order ones in Mandel form.
+    """
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"]) -> None:
+        ...
+    @property
+    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+        ...
+    @property
+    def density(self) -> float:
+        ...
+    @property
+    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+    @property
+    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+        ...
+    @property
+    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+        ...
+    @property
+    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+class Problem2:
+    """
+    A mesh with material, supports and contact part.
+    """
+    def __init__(self, *, mesh: Mesh2, material: Material2, clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contact_part: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, friction: typing.SupportsFloat | typing.SupportsIndex, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        `clamped` and `cooled` are part names with u = 0 and theta = 0; quadrature 0 is nodal, n Gauss's with n points.
+        """
+    @property
+    def material(self) -> Material2:
+        ...
+    @property
+    def mesh(self) -> Mesh2:
+        ...
+class Material3:
+    """
+    Density and the constant tensors of (2.1)-(2.4); fourth-order ones in Mandel form.
+    """
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None:
+        ...
+    @property
+    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+    @property
+    def density(self) -> float:
+        ...
+    @property
+    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        ...
+    @property
+    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+    @property
+    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+    @property
+    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        ...
+class Problem3:
+    """
+    A mesh with material, supports and contact part.
+    """
+    def __init__(self, *, mesh: Mesh3, material: Material3, clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contact_part: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, friction: typing.SupportsFloat | typing.SupportsIndex, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        `clamped` and `cooled` are part names with u = 0 and theta = 0; quadrature 0 is nodal, n Gauss's with n points.
+        """
+    @property
+    def material(self) -> Material3:
+        ...
+    @property
+    def mesh(self) -> Mesh3:
+        ...
+class Layout2:
+    """
+    A mesh distributed over the ranks of a communicator.
+    """
+    def __init__(self, comm: mpi4py.MPI.Comm | petsc4py.PETSc.Comm | None, mesh: Mesh2) -> None:
+        ...
+    def distribute(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], vec: petsc4py.PETSc.Vec) -> None:
+        """
+        Sets `vec` from values in mesh numbering, (nodes * block).
+        """
+    def gather(self, vec: petsc4py.PETSc.Vec) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The whole vector in mesh numbering, on every rank (collective).
+        """
+    def vector(self, block: typing.SupportsInt | typing.SupportsIndex) -> petsc4py.PETSc.Vec:
+        """
+        A zero vector, `block` unknowns a node.
+        """
+    @property
+    def local_cells(self) -> int:
+        """
+        Cells of this rank.
+        """
+    @property
+    def mesh_nodes(self) -> list[int]:
+        """
+        Mesh number of every local node, owned first.
+        """
+    @property
+    def owned_nodes(self) -> int:
+        """
+        Nodes this rank owns.
+        """
+class Norms2:
+    """
+    Exact norms of P1 functions.
+    """
+    def __init__(self, layout: Layout2) -> None:
+        ...
+    def l2(self, vec: petsc4py.PETSc.Vec) -> float:
+        """
+        |v|_L2 of a scalar or a vector field (collective).
+        """
+    def v(self, vec: petsc4py.PETSc.Vec) -> float:
+        """
+        |v|_V = |eps(v)|_L2 of a displacement (collective).
+        """
+class Operators2:
+    """
+    The constant matrices as petsc4py objects, without boundary conditions.
+    """
+    def __init__(self, layout: Layout2, problem: Problem2) -> None:
+        ...
+    @property
+    def clamped(self) -> list[int]:
+        """
+        Global scalar indices with u = 0 owned by this rank.
+        """
+    @property
+    def conductivity(self) -> petsc4py.PETSc.Mat:
+        """
+        d(theta, eta)
+        """
+    @property
+    def cooled(self) -> list[int]:
+        """
+        Global nodes with theta = 0 owned by this rank.
+        """
+    @property
+    def elasticity(self) -> petsc4py.PETSc.Mat:
+        """
+        a(u, v)
+        """
+    @property
+    def exchange(self) -> petsc4py.PETSc.Mat:
+        """
+        int k_c theta eta over Gamma_C
+        """
+    @property
+    def expansion(self) -> petsc4py.PETSc.Mat:
+        """
+        m(theta, v)
+        """
+    @property
+    def heating(self) -> petsc4py.PETSc.Mat:
+        """
+        e(w, eta)
+        """
+    @property
+    def mass(self) -> petsc4py.PETSc.Mat:
+        """
+        (theta, eta)
+        """
+    @property
+    def vector_mass(self) -> petsc4py.PETSc.Mat:
+        """
+        (w, v) without the density
+        """
+    @property
+    def viscosity(self) -> petsc4py.PETSc.Mat:
+        """
+        b(w, v)
+        """
+class ContactSurface2:
+    """
+    Contact points, weights and normals, the same on every rank.
+    """
+    def __init__(self, layout: Layout2, problem: Problem2) -> None:
+        ...
+    def unknowns(self, block: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
+        """
+        Global scalar indices of the contact unknowns, (d nodes).
+        """
+    @property
+    def nodes(self) -> int:
+        """
+        Number of contact nodes.
+        """
+    @property
+    def normals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        (points, d), outward unit normals
+        """
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        (points, d)
+        """
+    @property
+    def weights(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (points), area
+        """
+class LoadQuadrature2:
+    """
+    Quadrature over the rank's cells, or the facets of a part.
+    """
+    def __init__(self, layout: Layout2, part: str | None, points: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def load(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> petsc4py.PETSc.Vec:
+        """
+        int f . v with values (points, components) (collective).
+        """
+    def squared_distance(self, field: petsc4py.PETSc.Vec, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> float:
+        """
+        |field - values|_L2 squared (collective).
+        """
+    def squared_strain_distance(self, field: petsc4py.PETSc.Vec, gradients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> float:
+        """
+        |eps(field) - sym gradients|_L2 squared; gradients (points, d*d) (collective).
+        """
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        (points, d), this rank's.
+        """
+class Layout3:
+    """
+    A mesh distributed over the ranks of a communicator.
+    """
+    def __init__(self, comm: mpi4py.MPI.Comm | petsc4py.PETSc.Comm | None, mesh: Mesh3) -> None:
+        ...
+    def distribute(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], vec: petsc4py.PETSc.Vec) -> None:
+        """
+        Sets `vec` from values in mesh numbering, (nodes * block).
+        """
+    def gather(self, vec: petsc4py.PETSc.Vec) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The whole vector in mesh numbering, on every rank (collective).
+        """
+    def vector(self, block: typing.SupportsInt | typing.SupportsIndex) -> petsc4py.PETSc.Vec:
+        """
+        A zero vector, `block` unknowns a node.
+        """
+    @property
+    def local_cells(self) -> int:
+        """
+        Cells of this rank.
+        """
+    @property
+    def mesh_nodes(self) -> list[int]:
+        """
+        Mesh number of every local node, owned first.
+        """
+    @property
+    def owned_nodes(self) -> int:
+        """
+        Nodes this rank owns.
+        """
+class Norms3:
+    """
+    Exact norms of P1 functions.
+    """
+    def __init__(self, layout: Layout3) -> None:
+        ...
+    def l2(self, vec: petsc4py.PETSc.Vec) -> float:
+        """
+        |v|_L2 of a scalar or a vector field (collective).
+        """
+    def v(self, vec: petsc4py.PETSc.Vec) -> float:
+        """
+        |v|_V = |eps(v)|_L2 of a displacement (collective).
+        """
+class Operators3:
+    """
+    The constant matrices as petsc4py objects, without boundary conditions.
+    """
+    def __init__(self, layout: Layout3, problem: Problem3) -> None:
+        ...
+    @property
+    def clamped(self) -> list[int]:
+        """
+        Global scalar indices with u = 0 owned by this rank.
+        """
+    @property
+    def conductivity(self) -> petsc4py.PETSc.Mat:
+        """
+        d(theta, eta)
+        """
+    @property
+    def cooled(self) -> list[int]:
+        """
+        Global nodes with theta = 0 owned by this rank.
+        """
+    @property
+    def elasticity(self) -> petsc4py.PETSc.Mat:
+        """
+        a(u, v)
+        """
+    @property
+    def exchange(self) -> petsc4py.PETSc.Mat:
+        """
+        int k_c theta eta over Gamma_C
+        """
+    @property
+    def expansion(self) -> petsc4py.PETSc.Mat:
+        """
+        m(theta, v)
+        """
+    @property
+    def heating(self) -> petsc4py.PETSc.Mat:
+        """
+        e(w, eta)
+        """
+    @property
+    def mass(self) -> petsc4py.PETSc.Mat:
+        """
+        (theta, eta)
+        """
+    @property
+    def vector_mass(self) -> petsc4py.PETSc.Mat:
+        """
+        (w, v) without the density
+        """
+    @property
+    def viscosity(self) -> petsc4py.PETSc.Mat:
+        """
+        b(w, v)
+        """
+class ContactSurface3:
+    """
+    Contact points, weights and normals, the same on every rank.
+    """
+    def __init__(self, layout: Layout3, problem: Problem3) -> None:
+        ...
+    def unknowns(self, block: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
+        """
+        Global scalar indices of the contact unknowns, (d nodes).
+        """
+    @property
+    def nodes(self) -> int:
+        """
+        Number of contact nodes.
+        """
+    @property
+    def normals(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (points, d), outward unit normals
+        """
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (points, d)
+        """
+    @property
+    def weights(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (points), area
+        """
+class LoadQuadrature3:
+    """
+    Quadrature over the rank's cells, or the facets of a part.
+    """
+    def __init__(self, layout: Layout3, part: str | None, points: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def load(self, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> petsc4py.PETSc.Vec:
+        """
+        int f . v with values (points, components) (collective).
+        """
+    def squared_distance(self, field: petsc4py.PETSc.Vec, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> float:
+        """
+        |field - values|_L2 squared (collective).
+        """
+    def squared_strain_distance(self, field: petsc4py.PETSc.Vec, gradients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> float:
+        """
+        |eps(field) - sym gradients|_L2 squared; gradients (points, d*d) (collective).
+        """
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (points, d), this rank's.
+        """
+class Backend:
+    """
+    Members:
+    
+      automatic
+    
+      cholmod
+    
+      petsc
+    """
+    __members__: typing.ClassVar[dict[str, Backend]]
+    automatic: typing.ClassVar[Backend]
+    cholmod: typing.ClassVar[Backend]
+    petsc: typing.ClassVar[Backend]
+    @typing.overload
+    def __eq__(self, other: Backend) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Backend) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Symmetry:
+    """
+    Members:
+    
+      positive_definite
+    
+      symmetric
+    
+      general
+    """
+    __members__: typing.ClassVar[dict[str, Symmetry]]
+    general: typing.ClassVar[Symmetry]
+    positive_definite: typing.ClassVar[Symmetry]
+    symmetric: typing.ClassVar[Symmetry]
+    @typing.overload
+    def __eq__(self, other: Symmetry) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Symmetry) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Factor:
+    """
+    A factored operator with some unknowns held apart (collective).
+    """
+    def __init__(self, matrix: petsc4py.PETSc.Mat, trailing: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], symmetry: Symmetry, block: typing.SupportsInt | typing.SupportsIndex, prefix: str, backend: Backend) -> None:
+        ...
+    def compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        E^T K^-1 E.
+        """
+    def expand(self, load: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], out: petsc4py.PETSc.Vec) -> None:
+        """
+        K^-1 (r - E load): the second half.
+        """
+    def reduce(self, right: petsc4py.PETSc.Vec) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        E^T K^-1 r: the first half of a solve.
+        """
+    def solve(self, right: petsc4py.PETSc.Vec, out: petsc4py.PETSc.Vec) -> None:
+        """
+        K^-1 r.
+        """
+    @property
+    def bytes(self) -> float:
+        ...
+    @property
+    def description(self) -> str:
+        ...
+    @property
+    def substitutions(self) -> int:
+        ...
+class Coupling:
+    """
+    Members:
+    
+      staggered
+    
+      lagged
+    
+      monolithic
+    """
+    __members__: typing.ClassVar[dict[str, Coupling]]
+    lagged: typing.ClassVar[Coupling]
+    monolithic: typing.ClassVar[Coupling]
+    staggered: typing.ClassVar[Coupling]
+    @typing.overload
+    def __eq__(self, other: Coupling) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Coupling) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Outcome:
+    """
+    Members:
+    
+      right
+    
+      contact_not_converged
+    
+      not_finite
+    """
+    __members__: typing.ClassVar[dict[str, Outcome]]
+    contact_not_converged: typing.ClassVar[Outcome]
+    not_finite: typing.ClassVar[Outcome]
+    right: typing.ClassVar[Outcome]
+    @typing.overload
+    def __eq__(self, other: Outcome) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Outcome) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Stage:
+    """
+    Members:
+    
+      none
+    
+      newton
+    
+      line_search
+    
+      fixed_point
+    
+      enumeration
+    """
+    __members__: typing.ClassVar[dict[str, Stage]]
+    enumeration: typing.ClassVar[Stage]
+    fixed_point: typing.ClassVar[Stage]
+    line_search: typing.ClassVar[Stage]
+    newton: typing.ClassVar[Stage]
+    none: typing.ClassVar[Stage]
+    @typing.overload
+    def __eq__(self, other: Stage) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Stage) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class ContactOptions:
+    def __init__(self) -> None:
+        ...
+    @property
+    def enumerate_points(self) -> int:
+        ...
+    @enumerate_points.setter
+    def enumerate_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def fixed_point_steps(self) -> int:
+        ...
+    @fixed_point_steps.setter
+    def fixed_point_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def newton_steps(self) -> int:
+        ...
+    @newton_steps.setter
+    def newton_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tolerance(self) -> float:
+        ...
+    @tolerance.setter
+    def tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Ledger:
+    """
+    Terms and relative residuals of the balances of one step.
+    """
+    terms: typing.ClassVar[tuple] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor')
+    @property
+    def conducted(self) -> float:
+        ...
+    @property
+    def contact(self) -> float:
+        ...
+    @property
+    def contact_change(self) -> float:
+        ...
+    @property
+    def contact_damping(self) -> float:
+        ...
+    @property
+    def elastic(self) -> float:
+        ...
+    @property
+    def elastic_change(self) -> float:
+        ...
+    @property
+    def elastic_damping(self) -> float:
+        ...
+    @property
+    def energy_residual(self) -> float:
+        ...
+    @property
+    def exchanged(self) -> float:
+        ...
+    @property
+    def expansion_work(self) -> float:
+        ...
+    @property
+    def force_residual(self) -> float:
+        ...
+    @property
+    def friction(self) -> float:
+        ...
+    @property
+    def gap_work(self) -> float:
+        ...
+    @property
+    def heat_change(self) -> float:
+        ...
+    @property
+    def heat_damping(self) -> float:
+        ...
+    @property
+    def heat_residual(self) -> float:
+        ...
+    @property
+    def heating(self) -> float:
+        ...
+    @property
+    def inertia_damping(self) -> float:
+        ...
+    @property
+    def kinetic(self) -> float:
+        ...
+    @property
+    def kinetic_change(self) -> float:
+        ...
+    @property
+    def law_floor(self) -> float:
+        ...
+    @property
+    def law_residual(self) -> float:
+        ...
+    @property
+    def load_work(self) -> float:
+        ...
+    @property
+    def supplied(self) -> float:
+        ...
+    @property
+    def viscous(self) -> float:
+        ...
+class Cost:
+    """
+    What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
+    """
+    items: typing.ClassVar[tuple] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    @property
+    def contact_seconds(self) -> float:
+        ...
+    @property
+    def dense_factorizations(self) -> int:
+        ...
+    @property
+    def factor_bytes(self) -> float:
+        ...
+    @property
+    def factorizations(self) -> int:
+        ...
+    @property
+    def heat_seconds(self) -> float:
+        ...
+    @property
+    def momentum_seconds(self) -> float:
+        ...
+    @property
+    def newton_iterations(self) -> int:
+        ...
+    @property
+    def setup_seconds(self) -> float:
+        ...
+    @property
+    def step_seconds(self) -> float:
+        ...
+    @property
+    def steps(self) -> int:
+        ...
+    @property
+    def substitutions(self) -> int:
+        ...
+class StepReport2:
+    """
+    What one step did.
+    """
+    @property
+    def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        its tangential part, (d)
+        """
+    @property
+    def ledger(self) -> Ledger:
+        ...
+    @property
+    def max_penetration(self) -> float:
+        """
+        length
+        """
+    @property
+    def newton_iterations(self) -> int:
+        ...
+    @property
+    def normal_force(self) -> float:
+        """
+        int p_nu, force
+        """
+    @property
+    def open(self) -> int:
+        ...
+    @property
+    def outcome(self) -> Outcome:
+        ...
+    @property
+    def slip(self) -> int:
+        ...
+    @property
+    def stage(self) -> Stage:
+        ...
+    @property
+    def stick(self) -> int:
+        ...
+    @property
+    def traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        int sigma nu over Gamma_C, (d)
+        """
+class Stepper2:
+    """
+    Backward Euler with a fixed step (collective).
+    """
+    def __init__(self, layout: Layout2, problem: Problem2, operators: Operators2, surface: ContactSurface2, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
+        ...
+    def advance(self, force: petsc4py.PETSc.Vec, heat: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> StepReport2:
+        """
+        One step; the state stays when the outcome is not right.
+        """
+    def start(self, u: petsc4py.PETSc.Vec, w: petsc4py.PETSc.Vec, theta: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points)
+        """
+    @property
+    def contact_force(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points), of the body on the foundation
+        """
+    @property
+    def cost(self) -> Cost:
+        ...
+    @property
+    def heat_factor(self) -> Factor:
+        ...
+    @property
+    def momentum_factor(self) -> Factor:
+        ...
+    @property
+    def solver(self) -> str:
+        """
+        The factorizations in words.
+        """
+    @property
+    def status(self) -> list[int]:
+        """
+        0 open, 1 stick, 2 slip, a point
+        """
+    @property
+    def theta(self) -> petsc4py.PETSc.Vec:
+        """
+        Temperature.
+        """
+    @property
+    def time(self) -> float:
+        ...
+    @property
+    def u(self) -> petsc4py.PETSc.Vec:
+        """
+        Displacement. The vectors change owner at every step: ask again.
+        """
+    @property
+    def w(self) -> petsc4py.PETSc.Vec:
+        """
+        Velocity.
+        """
+class StepReport3:
+    """
+    What one step did.
+    """
+    @property
+    def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        its tangential part, (d)
+        """
+    @property
+    def ledger(self) -> Ledger:
+        ...
+    @property
+    def max_penetration(self) -> float:
+        """
+        length
+        """
+    @property
+    def newton_iterations(self) -> int:
+        ...
+    @property
+    def normal_force(self) -> float:
+        """
+        int p_nu, force
+        """
+    @property
+    def open(self) -> int:
+        ...
+    @property
+    def outcome(self) -> Outcome:
+        ...
+    @property
+    def slip(self) -> int:
+        ...
+    @property
+    def stage(self) -> Stage:
+        ...
+    @property
+    def stick(self) -> int:
+        ...
+    @property
+    def traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        int sigma nu over Gamma_C, (d)
+        """
+class Stepper3:
+    """
+    Backward Euler with a fixed step (collective).
+    """
+    def __init__(self, layout: Layout3, problem: Problem3, operators: Operators3, surface: ContactSurface3, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
+        ...
+    def advance(self, force: petsc4py.PETSc.Vec, heat: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> StepReport3:
+        """
+        One step; the state stays when the outcome is not right.
+        """
+    def start(self, u: petsc4py.PETSc.Vec, w: petsc4py.PETSc.Vec, theta: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points)
+        """
+    @property
+    def contact_force(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points), of the body on the foundation
+        """
+    @property
+    def cost(self) -> Cost:
+        ...
+    @property
+    def heat_factor(self) -> Factor:
+        ...
+    @property
+    def momentum_factor(self) -> Factor:
+        ...
+    @property
+    def solver(self) -> str:
+        """
+        The factorizations in words.
+        """
+    @property
+    def status(self) -> list[int]:
+        """
+        0 open, 1 stick, 2 slip, a point
+        """
+    @property
+    def theta(self) -> petsc4py.PETSc.Vec:
+        """
+        Temperature.
+        """
+    @property
+    def time(self) -> float:
+        ...
+    @property
+    def u(self) -> petsc4py.PETSc.Vec:
+        """
+        Displacement. The vectors change owner at every step: ask again.
+        """
+    @property
+    def w(self) -> petsc4py.PETSc.Vec:
+        """
+        Velocity.
+        """
+@typing.overload
+def heat_matrix(operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
+    """
+    M / k + D + J, cooled.
+    """
+@typing.overload
+def heat_matrix(operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
+    """
+    M / k + D + J, cooled.
+    """
+@typing.overload
+def momentum_matrix(layout: Layout2, problem: Problem2, operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
+    """
+    rho M / k + B + k A, clamped.
+    """
+@typing.overload
+def momentum_matrix(layout: Layout3, problem: Problem3, operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
+    """
+    rho M / k + B + k A, clamped.
+    """
+@typing.overload
+def prolongation(coarse: Mesh2, fine: Mesh2) -> scipy.sparse.csr_matrix:
+    """
+    Exact interpolation of P1 functions between nested meshes, a SciPy CSR matrix (fine nodes, coarse nodes); ValueError if they are not nested.
+    """
+@typing.overload
+def prolongation(coarse: Mesh3, fine: Mesh3) -> scipy.sparse.csr_matrix:
+    """
+    Exact interpolation of P1 functions between nested meshes, a SciPy CSR matrix (fine nodes, coarse nodes); ValueError if they are not nested.
+    """
+def simplex_rule(dim: typing.SupportsInt | typing.SupportsIndex, points: typing.SupportsInt | typing.SupportsIndex) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+    """
+    Barycentric points (q, dim+1) and weights (q), exact to degree 2 points - 1.
+    """
+@typing.overload
+def stress(mesh: Mesh2, material: Material2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]:
+    """
+    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes).
+    """
+@typing.overload
+def stress(mesh: Mesh3, material: Material3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]:
+    """
+    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes).
+    """
+compiler: str = 'g++ 12.2.0'
+petsc_version: str = '3.18.5'

@@ -1,0 +1,156 @@
+// Factorizations and the stepper on the paper's problem in the plane and one dimension up, on any number of ranks.
+#include <doctest/doctest.h>
+
+#include "warmslip/stepper.hpp"
+
+using namespace warmslip;
+
+namespace {
+
+using Two = std::integral_constant<int, 2>;
+using Three = std::integral_constant<int, 3>;
+
+/// The paper's data with K = I, M = I and R = heating I; in 3D on a cube held at the top, warm everywhere but below.
+template <int d>
+struct Paper {
+  std::shared_ptr<const Mesh<d>> mesh;
+  Problem<d> problem;
+  Layout<d> layout;
+  Operators<d> operators;
+  ContactSurface<d> surface;
+  VecHandle force, heat;
+
+  static std::shared_ptr<const Mesh<d>> unit_box(int n) {
+    std::array<int, d> counts;
+    std::array<double, d> lengths;
+    counts.fill(n);
+    lengths.fill(1);
+    return std::make_shared<Mesh<d>>(box<d>(counts, lengths, Diagonal::right));
+  }
+  static Problem<d> paper(std::shared_ptr<const Mesh<d>> mesh, double heating, int quadrature) {
+    const Tensor2<d> id = Tensor2<d>::Identity();
+    const Material<d> material{1, isotropic<d>(0.2, 0.9), isotropic<d>(10, 5), id, id, heating * id};
+    std::vector<std::string> cooled{"top", "left", "right"};
+    if (d == 3) cooled.insert(cooled.end(), {"front", "back"});
+    return {std::move(mesh), material, {"top"}, cooled, "bottom", {{1e4}, {0.2}}, {quadrature}, 1};
+  }
+  explicit Paper(int n, double heating = 1, int quadrature = 0)
+      : mesh(unit_box(n)), problem(paper(mesh, heating, quadrature)), layout(PETSC_COMM_WORLD, mesh), operators(layout, problem),
+        surface(layout, problem), force(layout.vector(d)), heat(layout.vector(1)) {
+    Point<d> weight = -Point<d>::Unit(d - 1), left = 0.4 * Point<d>::Unit(d - 1), right = left;
+    left[0] = 1.4;
+    right[0] = -0.8;
+    add(std::nullopt, weight, force);
+    add("left", left, force);
+    add("right", right, force);
+    add(std::nullopt, Eigen::VectorXd::Ones(1), heat);
+    add("bottom", Eigen::VectorXd::Constant(1, 10), heat);
+  }
+  void add(const std::optional<std::string>& part, const Eigen::VectorXd& value, Vec to) {
+    const LoadQuadrature<d> rule(layout, part, 1);
+    WARMSLIP_PETSC(VecAXPY(to, 1, rule.load(value.transpose().replicate(rule.positions().rows(), 1))));
+  }
+  /// |u|_V, |w|, |theta|, normal force after `steps` steps to T = 1, every identity within 1e-11 on the way.
+  Eigen::Vector4d run(int steps, Coupling coupling, Backend backend = Backend::automatic) {
+    Stepper<d> stepper(layout, problem, operators, surface, {1.0 / steps, coupling, backend, {}});
+    const Eigen::VectorXd gap = Eigen::VectorXd::Zero(surface.points());
+    stepper.start(layout.vector(d), layout.vector(d), layout.vector(1), gap);
+    StepReport<d> report;
+    for (int n = 0; n < steps; ++n) {
+      report = stepper.advance({force, heat, gap});
+      REQUIRE(report.outcome == Outcome::right);
+      const Ledger& l = report.ledger;
+      CHECK(std::max({l.energy_residual, l.heat_residual, l.force_residual}) <= 1e-11);
+      CHECK(l.law_residual <= 1e-11);
+      CHECK(std::min({l.inertia_damping, l.elastic_damping, l.contact_damping, l.viscous, l.friction, l.heat_damping, l.conducted}) >= 0);
+      CHECK(report.open + report.stick + report.slip == surface.points());
+    }
+    CHECK(stepper.steps() == steps);
+    CHECK(stepper.time() == doctest::Approx(1).epsilon(1e-14));
+    CHECK(report.slip > 0);
+    const Norms<d> norms(layout);
+    return {norms.v(stepper.level().u), norms.l2(stepper.level().w), norms.l2(stepper.level().theta), report.normal_force};
+  }
+};
+
+/// Within 1e-10, with what was found in the message.
+void check_near(const Eigen::Vector4d& found, const Eigen::Vector4d& stored) {
+  const Eigen::IOFormat digits(Eigen::FullPrecision, 0, ", ", ", ");
+  std::ostringstream text;
+  text << found.transpose().format(digits);
+  CAPTURE(text.str());
+  CHECK(((found - stored).array() / stored.array()).abs().maxCoeff() <= 1e-10);
+}
+
+template <int d>
+void check_factor(Paper<d>& paper, Mat matrix, Symmetry symmetry, int block, bool cholmod_serves) {
+  const int ranks = static_cast<int>(paper.layout.sum(1.0));
+  const auto trailing = paper.surface.unknowns(block);
+  const VecHandle right = paper.layout.vector(block), x = duplicate(right), product = duplicate(right), y = duplicate(right);
+  paper.layout.distribute(Eigen::VectorXd::LinSpaced(paper.mesh->nodes.rows() * block, -1, 2).array().sin(), right);
+  const auto distance = [&](Vec a, Vec b) {
+    PetscReal size, difference;
+    WARMSLIP_PETSC(VecNorm(a, NORM_2, &size));
+    WARMSLIP_PETSC(VecAXPY(a, -1, b));
+    WARMSLIP_PETSC(VecNorm(a, NORM_2, &difference));
+    return difference / size;
+  };
+  const auto petsc = factor(matrix, trailing, symmetry, block, "test", Backend::petsc);
+  const Eigen::VectorXd held = petsc->reduce(right);
+  const Eigen::MatrixXd compliance = petsc->compliance();
+  petsc->solve(right, x);
+  WARMSLIP_PETSC(MatMult(matrix, x, product));
+  CHECK(distance(product, right) <= 1e-11);
+  CHECK((compliance - compliance.transpose()).norm() <= (symmetry == Symmetry::general ? 1e9 : 1e-11) * compliance.norm());
+  // the compliance is what a load on the held-apart unknowns moves them by
+  const Eigen::VectorXd load = Eigen::VectorXd::LinSpaced(held.size(), 1, 2);
+  petsc->reduce(right);
+  petsc->expand(load, x);
+  const Eigen::VectorXd moved = petsc->reduce(right) - compliance * load;
+  const Eigen::VectorXd values = paper.layout.gather(x);
+  if (ranks == 1)
+    for (std::size_t i = 0; i < trailing.size(); ++i)
+      CHECK(values[trailing[i]] == doctest::Approx(moved[static_cast<Eigen::Index>(i)]).epsilon(1e-9));
+  if (ranks > 1 || !cholmod_serves) {
+    CHECK_THROWS_AS(factor(matrix, trailing, symmetry, block, "test", Backend::cholmod), std::invalid_argument);
+    return;
+  }
+  const auto cholmod = factor(matrix, trailing, symmetry, block, "test", Backend::cholmod);
+  CHECK((cholmod->reduce(right) - held).norm() <= 1e-10 * held.norm());
+  CHECK((cholmod->compliance() - compliance).norm() <= 1e-10 * compliance.norm());
+  cholmod->expand(load, y);
+  CHECK(distance(y, x) <= 1e-10);
+  CHECK(cholmod->substitutions() == 1);
+  CHECK(cholmod->bytes() > 0);
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("both backends factor the same operators", D, Two, Three) {
+  constexpr int d = D::value;
+  Paper<d> paper(d == 2 ? 6 : 3);
+  check_factor<d>(paper, momentum_matrix(paper.layout, paper.problem, paper.operators, 0.1), Symmetry::positive_definite, d, true);
+  const auto coupled = [&](Paper<d>& p, double scale, Symmetry symmetry, bool served) {
+    check_factor<d>(p, coupled_matrix(p.layout, p.problem, p.operators, 0.1, scale), symmetry, d + 1, served);
+  };
+  coupled(paper, 1, Symmetry::positive_definite, true);
+  Paper<d> opposite(d == 2 ? 6 : 3, -1);
+  coupled(opposite, -1, Symmetry::symmetric, true);  // quasi-definite: pivots of both signs
+  Paper<d> skewed(d == 2 ? 6 : 3, -1);
+  coupled(skewed, 1, Symmetry::general, false);
+}
+
+TEST_CASE("the plane problem: norms on any number of ranks, every coupling and quadrature") {
+  check_near(Paper<2>(8).run(8, Coupling::staggered), {0.0495886223914231, 0.0267642744764715, 0.898160618902909, 0.904968185665935});
+  check_near(Paper<2>(8).run(8, Coupling::lagged), {0.0495863711120781, 0.0267658292699907, 0.898147173550696, 0.904950892322555});
+  check_near(Paper<2>(8).run(8, Coupling::monolithic), {0.0493399993478305, 0.0267919934062631, 0.898137015288258, 0.907846547541927});
+  check_near(Paper<2>(8, -1).run(8, Coupling::monolithic), {0.0492981074834062, 0.0267760516730022, 0.89748528460677, 0.908002742864962});
+  check_near(Paper<2>(8, 1, 2).run(8, Coupling::staggered), {0.049588781597849, 0.0267560100406018, 0.898160727488345, 0.904939810305356});
+  check_near(Paper<2>(8).run(8, Coupling::staggered, Backend::petsc), {0.0495886223914232, 0.0267642744764716, 0.898160618902908, 0.904968185665936});
+}
+
+TEST_CASE("the block: norms on any number of ranks") {
+  check_near(Paper<3>(3).run(4, Coupling::staggered), {0.0685182367184955, 0.035939233734572, 0.404484873238518, 0.498623575304581});
+  check_near(Paper<3>(3, -1).run(4, Coupling::monolithic), {0.0682707127499522, 0.0359169669260807, 0.404600527785129, 0.500640793926774});
+  check_near(Paper<3>(3, 1, 2).run(4, Coupling::lagged), {0.068562728902031, 0.0358658061665048, 0.404470693603612, 0.498397879463677});
+}

@@ -1,0 +1,59 @@
+"""The command `warmslip`: exit codes, one line a problem, the files a run leaves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from conftest import Command
+from warmslip.scene import load
+
+SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (["paper_mixed", "--set", "contact.stifness=1"], ["contact.stifness: unknown key; did you mean 'stiffness'"]),
+        (["paper_mixed", "--set", "inertia.density=-1", "--set", "time.steps=nan"], ["time.steps", "inertia.density = -1"]),
+        (["paper_mixed", "--set", "inertia.density=0", "--set", "supports.displacement=[]"], ["the momentum operator is singular"]),
+        (["nowhere.toml"], ["cannot read scene 'nowhere.toml'"]),
+        (["paper_mixed", *SMALL, "--set", "supports.displacement=['top','left']", "--set", "contact.part='flor'"], ["unknown boundary part"]),
+        (["paper_mixed", "--backend", "magic"], ["--backend 'magic' is unknown"]),
+    ],
+    ids=["unknown key", "two problems", "singular", "missing file", "unknown part", "backend"],
+)
+def test_refusals(command: Command, tmp_path: Path, arguments: list[str], lines: list[str]) -> None:
+    result = command("run", *arguments, "--out", "run")
+    said = result.stderr.strip().splitlines()
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr + result.stdout
+    assert len(said) == len(lines)
+    assert all(line.startswith("error: ") and words in line for line, words in zip(said, lines, strict=True))
+    assert not (tmp_path / "run").exists()
+
+
+def test_output_folder_that_is_a_file(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    result = command("run", "paper_mixed", *SMALL, "--out", "taken")
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    assert "taken" in result.stderr
+
+
+def test_run_leaves_summary_and_trajectory(command: Command, tmp_path: Path) -> None:
+    result = command("run", "paper_mixed", *SMALL, "--set", "contact.friction.coefficient=0.1", "--out", "run")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("right: 2 steps")
+    summary = json.loads((tmp_path / "run/summary.json").read_text())
+    assert summary["outcome"] == "right"
+    assert summary["stamp"]["scene"]["contact"]["friction"]["coefficient"] == 0.1
+    assert (tmp_path / "run/trajectory.h5").stat().st_size > 0
+
+
+def test_list_and_schema(command: Command) -> None:
+    listed = command("list").stdout
+    assert all(name in listed for name in ("paper_printed", "paper_consistent", "block_3d"))
+    printed = json.loads(command("schema").stdout)
+    assert printed == type(load("paper_mixed")).model_json_schema()

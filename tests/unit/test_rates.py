@@ -1,0 +1,138 @@
+"""Orders from errors, and what readings and verdict make of tables."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from warmslip import judge, rates, readings
+from warmslip.errors import SUMS, TERMS
+from warmslip.runner import IDENTITIES
+
+Row = dict[str, Any]
+LEVELS, REFERENCE = (16, 32, 64, 128), 1 / 256
+
+
+def write(path: Path, rows: list[Row]) -> Path:
+    with path.open("w", newline="") as file:
+        table = csv.DictWriter(file, list(rows[0]))
+        table.writeheader()
+        table.writerows(rows)
+    return path
+
+
+@pytest.mark.parametrize(("p", "shown"), [(1.0, (1.10, 1.22, 1.58)), (0.75, (0.90, 1.04, 1.42))])
+def test_bias_of_the_self_reference(p: float, shown: tuple[float, ...]) -> None:
+    """A true order measured against the finest solution shows these values, and is recovered from them."""
+    errors = [n**-p - REFERENCE**p for n in LEVELS]
+    for n, coarse, fine, expected in zip(LEVELS, errors, errors[1:], shown, strict=False):
+        assert rates.observed(coarse, fine) == pytest.approx(expected, abs=0.005)
+        assert rates.corrected(coarse, fine, 1 / n, REFERENCE, quadratic=False) == pytest.approx(p, abs=1e-9)
+
+
+def test_bias_in_the_energy_norm() -> None:
+    errors = [math.sqrt(n**-1.38 - REFERENCE**1.38) for n in LEVELS]
+    for n, coarse, fine in zip(LEVELS, errors, errors[1:], strict=False):
+        r = (1 / n) / REFERENCE
+        assert rates.observed(coarse, fine) == pytest.approx(0.5 * math.log2((r**1.38 - 1) / ((r / 2) ** 1.38 - 1)), rel=1e-12)
+        assert rates.corrected(coarse, fine, 1 / n, REFERENCE, quadratic=True) == pytest.approx(0.69, abs=1e-9)
+
+
+def test_orders_that_do_not_exist_are_nan() -> None:
+    assert math.isnan(rates.observed(1.0, 0.0))
+    assert math.isnan(rates.observed(math.nan, 1.0))
+    assert math.isnan(rates.corrected(1.0, 2.0, 1 / 16, REFERENCE, quadratic=False))
+
+
+def test_least_squares() -> None:
+    h = [1 / n for n in LEVELS]
+    order, misfit = rates.least_squares(h, [3 * x**1.3 for x in h])
+    assert (order, misfit) == (pytest.approx(1.3, abs=1e-12), pytest.approx(0, abs=1e-12))
+    _, bent = rates.least_squares(h, [x * (1 + 0.3 * (i % 2)) for i, x in enumerate(h)])
+    assert bent > 0.05
+
+
+def test_williams_exponents_of_the_paper() -> None:
+    young, poisson = 2, 0.1
+    lam, mu = young * poisson / (1 - poisson**2), young / (2 * (1 + poisson))
+    assert rates.williams_exponent(10, 5) == pytest.approx(0.690, abs=1e-3)  # mu_1 tr(e) I + mu_2 e, both 10
+    assert rates.williams_exponent(10, 5) == pytest.approx(rates.williams_exponent(20, 10), abs=1e-12)
+    assert rates.williams_exponent(lam, mu) == pytest.approx(0.876, abs=1e-3)
+
+
+def test_entitled_orders() -> None:
+    free = dict(hot=False, singular_conductivity=False, viscosity=(10.0, 5.0))
+    assert rates.entitled("theta_L2", **free) == 1.0
+    assert rates.entitled("theta_L2", **free | {"hot": True}) == 0.75
+    assert rates.entitled("theta_L2", **free | {"singular_conductivity": True}) == 0.5
+    assert rates.entitled("u_theta", **free) == rates.entitled("u_V", **free) == rates.williams_exponent(10, 5)
+
+
+def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> list[Row]:
+    rows = []
+    for n in (*LEVELS, 256):
+        e = dict.fromkeys([*TERMS, *SUMS], scale * n**-order)
+        row = {"n": n, "steps": n, "h": 1 / n, "k": 1 / n, "outcome": "right"} | {f"e_{t}": v for t, v in e.items()}
+        row |= {name: larger for name in ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2")}
+        rows.append(row | {f"identity_{i}": 1e-15 for i in IDENTITIES})
+    return rows
+
+
+def test_readings_judge_the_claims(tmp_path: Path) -> None:
+    def case(name: str, **how: float) -> Path:
+        return write(tmp_path / f"{name}_staggered.csv", study_rows(**how))
+
+    paths = [case("good_0"), case("good_10", larger=2), case("slow_0", order=0.5), case("slow_10", order=0.5, larger=0.5)]
+    paths.append(write(tmp_path / "good_10_lagged.csv", study_rows(larger=0.1)))
+    good, slow = readings.table(paths)
+    assert (good["reading"], slow["reading"]) == ("good", "slow")
+    for temperature in (0, 10):
+        assert (good[f"ticks_u_theta_{temperature}"], good[f"linear_u_theta_{temperature}"]) == ("yes", "yes")
+        assert (slow[f"ticks_u_theta_{temperature}"], slow[f"linear_u_theta_{temperature}"]) == ("no", "no")
+    assert (good["all_larger"], good["stress_ratio"]) == ("yes", 2)
+    assert (slow["all_larger"], slow["temperature_larger"]) == ("no", "no")
+
+
+def test_verdict_of_a_study(tmp_path: Path) -> None:
+    def verdict(rows: list[Row], expected: Row) -> dict[str, Any]:
+        path = write(tmp_path / "case.csv", rows)
+        return judge.verdict(studies=[path], manufactured_table=None, readings=None, extremes=None, expected=expected)
+
+    stored = judge.record(verdict(study_rows(), {}))
+    assert stored["case error u_V"] == 1.5 / 128
+    assert verdict(study_rows(), stored)["passed"]
+    assert not verdict(study_rows(), {})["passed"]  # a value that was never stored fails
+    for factor in (0.97, 1.03, math.nan):
+        failed = verdict(study_rows(scale=1.5 * factor), stored)["failed"]
+        assert {f"case error {t}" for t in [*TERMS, *SUMS]} == set(failed)
+    assert verdict(study_rows(scale=1.5 * 1.01), stored)["passed"]
+
+    def spoil(**change: Any) -> list[str]:
+        rows = study_rows()
+        rows[1] |= change
+        return list(verdict(rows, stored)["failed"])
+
+    assert spoil(outcome="contact_not_converged") == ["case runs that did not end right"]
+    assert spoil(identity_law=1e-10) == ["case law identity"]
+    assert spoil(identity_heat=math.nan) == ["case heat identity"]
+
+
+def test_near_is_two_sided() -> None:
+    assert judge.near("x", 1.019, 1.0).passed
+    assert not judge.near("x", 1.021, 1.0).passed
+    assert not judge.near("x", 0.979, 1.0).passed
+    assert judge.near("x", -1.019, -1.0).passed
+    assert not judge.near("x", math.nan, 1.0).passed
+    assert not judge.near("x", 1.0, None).passed
+
+
+def test_tables_survive_the_disk(tmp_path: Path) -> None:
+    row = {"n": 8, "e": 1e-300, "x": math.pi, "bad": math.nan, "far": -math.inf, "word": "right", "front": True}
+    (back,) = rates.read(write(tmp_path / "t.csv", [row]))
+    assert list(back) == list(row)
+    assert isinstance(back["n"], int)
+    np.testing.assert_equal(back, row)

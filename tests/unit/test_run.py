@@ -1,0 +1,192 @@
+"""A run: what its summary and stamp hold, how it stops, what it leaves on disk, how it restarts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import warmslip
+from warmslip import Loads, Run, Scene, Trajectory, _core, runner
+from warmslip.problem import discretise
+from warmslip.trajectory import LEDGER
+
+MakeScene = Callable[..., Scene]
+FIELDS = ("u", "w", "theta")
+
+
+def test_summary_holds_what_others_script_against(small: MakeScene, tmp_path: Path) -> None:
+    result = warmslip.run(small(), out=tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary == json.loads(json.dumps(result.summary))
+    assert summary["outcome"] == "right"
+    assert result.right
+    assert summary["steps"] == 4
+    assert summary["time"] == pytest.approx(1)
+    assert set(summary["norms"]) == {"u_V", "u_L2", "w_L2", "theta_L2"}
+    assert {"normal_force", "tangential_force", "max_penetration", "open", "stick", "slip"} <= set(summary["contact"])
+    assert {"energy", "heat", "force", "law"} <= set(summary["identities"])
+    assert all(summary["identities"][i] <= 1e-11 for i in ("energy", "heat", "force", "law"))
+    assert summary["newton"]["iterations"] >= summary["newton"]["largest_step"] >= 1
+    assert summary["cpu_seconds"] > 0
+    assert summary["memory_bytes"] > 2**20
+    contact = summary["contact"]
+    assert contact["open"] + contact["stick"] + contact["slip"] == 5
+    assert contact["traction"] == pytest.approx([-contact["tangential_force"], contact["normal_force"]], rel=1e-12)
+
+
+def test_stamp_says_what_produced_it_and_not_who(small: MakeScene) -> None:
+    scene = small()
+    stamp = warmslip.run(scene).summary["stamp"]
+    expected = {"version", "commit", "dirty", "fingerprint", "python", "cpu", "threads", "scene", "scene_hash"}
+    assert expected | {"petsc", "compiler", "ranks", "solver", "petsc_options"} <= set(stamp)
+    assert stamp["scene"] == scene.resolved()
+    assert stamp["scene_hash"] == scene.digest()
+    assert stamp["ranks"] == 1
+    assert not {"host", "hostname", "user", "node"} & set(stamp)
+
+
+def test_trajectory_holds_the_run(small: MakeScene, tmp_path: Path) -> None:
+    result = warmslip.run(small(), out=tmp_path)
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        assert t.time == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+        assert (t.u.shape, t.w.shape, t.theta.shape) == ((5, 25, 2), (5, 25, 2), (5, 25))
+        for name in FIELDS:
+            np.testing.assert_array_equal(getattr(t, name)[-1], getattr(result, name))
+        np.testing.assert_allclose(t.u[2] - t.u[1], 0.25 * t.w[2], rtol=0, atol=1e-16)
+        assert len(t.series("steps")["newton_iterations"]) == 4
+        assert set(t.series("ledger")) == set(LEDGER)
+        contact = t.series("contact")
+        assert contact["force"].shape == contact["displacement"].shape == (4, 5, 2)
+        assert contact["status"].shape == (4, 5)
+        # the friction law, read from the file alone
+        lam, pressure = contact["force"][..., 0], -contact["force"][..., 1]
+        assert (np.abs(lam) <= 0.2 * pressure * (1 + 1e-12) + 1e-15).all()
+        assert (pressure[contact["status"] == 0] == 0).all()
+        assert t.scene == small().resolved()
+
+
+def test_states_are_thinned(small: MakeScene, tmp_path: Path) -> None:
+    warmslip.run(small(time__steps=5, output__every=2), out=tmp_path)
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        assert t.time == pytest.approx([0, 0.4, 0.8, 1])
+        assert len(t.series("steps")["time"]) == 5
+
+
+def test_a_load_that_fails_leaves_the_states_before_it(small: MakeScene, tmp_path: Path) -> None:
+    scene = small(time__steps=8)
+
+    def failing(x: Any, t: float) -> Any:
+        return np.full((len(x), 2), np.nan if t > 0.6 else -1.0)
+
+    with pytest.raises(ValueError, match=r"not finite at t = 0\.625"):
+        warmslip.run(scene, out=tmp_path, loads=replace(Loads.of(scene), body=failing))
+    assert not (tmp_path / "summary.json").exists()
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        assert t.time == pytest.approx(np.arange(5) / 8)
+        assert all(np.isfinite(getattr(t, name)[:]).all() for name in FIELDS)
+
+
+def test_contact_that_does_not_converge_keeps_the_last_good_step(
+    small: MakeScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The solver is left without a method; the loads press from the third step on, so two steps are good."""
+    ordinary = _core.ContactOptions
+
+    def powerless() -> Any:
+        options = ordinary()
+        options.newton_steps = options.fixed_point_steps = options.enumerate_points = 0
+        return options
+
+    monkeypatch.setattr(_core, "ContactOptions", powerless)
+    scene = small(time__steps=6, loads__traction={})
+    loads = replace(Loads.of(scene), body=lambda x, t: np.full((len(x), 2), -1.0 if t > 0.4 else 0.0), source=0.0)
+    result = warmslip.run(scene, out=tmp_path, loads=loads)
+    assert result.outcome == "contact_not_converged"
+    assert not result.right
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["norms"]["u_V"] == 0
+    assert (summary["outcome"], summary["steps"]) == ("contact_not_converged", 2)
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        assert t.time == pytest.approx([0, 1 / 6, 2 / 6])
+        np.testing.assert_array_equal(t.u[-1], result.u)
+
+
+def test_an_impossible_tolerance_is_an_outcome(small: MakeScene) -> None:
+    d = discretise(small())
+    report = d.stepper(tolerance=-1.0).advance(*d.load_vectors.at(0.25))
+    assert report.outcome.name == "contact_not_converged"
+
+
+def test_a_state_that_is_not_finite_is_said(small: MakeScene) -> None:
+    """Numbers that overflow inside the step: the outcome says so and the state stays as it was."""
+    result = warmslip.run(small(loads__body=[0.0, -1e308]))
+    assert result.outcome != "right"
+    assert all(np.isfinite(getattr(result, name)).all() for name in FIELDS)
+
+
+def test_an_identity_that_is_violated_stops_the_run(small: MakeScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "residuals", lambda report: dict.fromkeys(runner.IDENTITIES, 1e-8))
+    result = warmslip.run(small())
+    assert (result.outcome, result.summary["steps"]) == ("identity_violated", 1)
+
+
+@pytest.mark.parametrize("coupling", ["staggered", "lagged", "monolithic"])
+def test_restart_gives_the_same_end(small: MakeScene, tmp_path: Path, coupling: str) -> None:
+    scene = small(mesh__n=6, time__steps=8, time__coupling=coupling, contact__heat_exchange__foundation_temperature=10.0)
+    whole = warmslip.run(scene, out=tmp_path)
+    d = discretise(scene)
+    stepper = d.stepper()
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        d.restart(stepper, t.u[3], t.w[3], t.theta[3], float(t.time[3]))
+    for n in range(4, 9):
+        assert stepper.advance(*d.load_vectors.at(n * scene.step)).outcome.name == "right"
+    assert stepper.time == pytest.approx(1)
+    for name in FIELDS:
+        found, expected = d.field(getattr(stepper, name)), getattr(whole, name)
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+def test_moving_loads_equal_constant_ones(small: MakeScene) -> None:
+    scene = small(contact__heat_exchange__foundation_temperature=10.0)
+    plain = Loads.of(scene)
+    moving = Loads(
+        body=lambda x, t: np.tile(plain.body, (len(x), 1)),
+        source=lambda x, t: np.full(len(x), plain.source),
+        traction={part: (lambda x, t, v=value: np.tile(v, (len(x), 1))) for part, value in plain.traction.items()},
+        gap=lambda x, t: np.zeros(len(x)),
+        foundation_temperature=lambda x, t: np.full(len(x), 10.0),
+    )
+    a, b = warmslip.run(scene), warmslip.run(scene, loads=moving)
+    for name in FIELDS:
+        assert np.abs(getattr(a, name) - getattr(b, name)).max() <= 1e-12 * np.abs(getattr(a, name)).max()
+
+
+def test_backends_agree(small: MakeScene) -> None:
+    for coupling in ("staggered", "monolithic"):
+        scene = small("consistent", time__coupling=coupling)
+        a, b = (warmslip.run(scene, backend=backend) for backend in ("cholmod", "petsc"))
+        assert a.summary["norms"] == pytest.approx(b.summary["norms"], rel=1e-11)
+        assert a.summary["stamp"]["solver"] != b.summary["stamp"]["solver"]
+    scene = small("mixed", heat__heating__tensor=[[1.0, 0.5], [0.5, 1.0]], time__coupling="monolithic")
+    with pytest.raises(ValueError, match="CHOLMOD"):
+        warmslip.run(scene, backend="cholmod")
+
+
+def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
+    job = Run(small(initial__velocity=[1.0, 0.5], initial__temperature=2.0, initial__displacement=[0.1, 0.2]))
+    d = job.discretisation
+    u, w, theta = (d.field(getattr(job.stepper, name)) for name in FIELDS)
+    top = np.unique(d.mesh.parts["top"])
+    cooled = np.unique(np.concatenate([d.mesh.parts[p] for p in ("top", "left", "right")]))
+    assert (u[top] == 0).all()
+    assert (w[top] == 0).all()
+    assert (theta[cooled] == 0).all()
+    assert (theta[np.setdiff1d(np.arange(25), cooled)] == 2).all()
+    assert (w[0] == [1, 0.5]).all()
+    assert (u[0] == [0.1, 0.2]).all()
+    assert all(report.outcome.name == "right" for report in job.steps())
