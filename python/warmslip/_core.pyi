@@ -818,7 +818,7 @@ class Ledger:
     """
     Terms and relative residuals of the balances of one step.
     """
-    terms: typing.ClassVar[tuple] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor')
+    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor')
     @property
     def conducted(self) -> float:
         ...
@@ -898,7 +898,7 @@ class Cost:
     """
     What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
     """
-    items: typing.ClassVar[tuple] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
     @property
     def contact_seconds(self) -> float:
         ...

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from warmslip.errors import SUMS, TERMS
+from warmslip.scene import build
 
 Row = dict[str, Any]
 
@@ -103,7 +104,7 @@ def table(path: Path, scene: Row) -> list[Row]:
     hot = scene["contact"]["heat_exchange"]["foundation_temperature"] != scene["initial"]["temperature"]
     out: list[Row] = []
     for term in [*TERMS, *SUMS]:
-        limit = entitled(term, hot=hot, singular_conductivity=singular, viscosity=tuple(scene["viscosity"]["lame"]))
+        limit = entitled(term, hot=hot, singular_conductivity=singular, viscosity=build(scene).viscosity.pair(2))
         before: Row | None = None
         for line in diagonal:
             error = line[f"e_{term}"]

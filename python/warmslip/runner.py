@@ -47,6 +47,11 @@ def residuals(report: Any) -> dict[str, float]:
     return {name: float(getattr(report.ledger, f"{name}_residual")) for name in IDENTITIES}
 
 
+def worse(one: float, other: float) -> float:
+    """The larger of two residuals; a nan is worse than anything."""
+    return other if not other <= one else one
+
+
 class Run:
     """A scene being stepped: iterate `steps()`, or let `warmslip.run` do it."""
 
@@ -84,10 +89,10 @@ class Run:
                 return
             self.report = report
             for name, value in residuals(report).items():
-                self.worst[name] = max(self.worst[name], value)
+                self.worst[name] = worse(self.worst[name], value)
             self.floor = max(self.floor, report.ledger.law_floor)
             yield report
-            if max(residuals(report).values()) > IDENTITY_BOUND + report.ledger.law_floor:
+            if not all(value <= IDENTITY_BOUND + report.ledger.law_floor for value in residuals(report).values()):
                 self.outcome = "identity_violated"
                 return
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+import math
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -12,9 +13,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, strict=True)]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=2, max_length=3)]
@@ -58,6 +59,10 @@ class MeshTable(Table):
                 raise ValueError(
                     f"{key} has {len(value)} entries but a {self.shape} has {self.dim} axes; give {self.dim}"
                 )
+        if math.prod(n + 1 for n in self.counts) > 10**8:
+            raise ValueError(
+                "n gives more than 100 million nodes, which 32-bit numbering cannot hold; use a coarser mesh"
+            )
         if self.dim == 3 and self.diagonal == "crisscross":
             raise ValueError("diagonal 'crisscross' exists for shape 'square' only; use 'right' or 'left'")
         return self
@@ -194,11 +199,12 @@ class Scene(Table):
                 "clamp a part or give inertia.density > 0"
             )
         if problems:
-            raise ValueError("; ".join(problems))
+            raise ValueError("\n".join(problems))
         return self
 
     def _part_problems(self) -> list[str]:
         known = PARTS[self.mesh.shape]
+        held = self.supports.displacement
         named = {
             "supports.displacement": self.supports.displacement,
             "supports.temperature": self.supports.temperature,
@@ -211,8 +217,16 @@ class Scene(Table):
             for part in parts
             if part not in known
         ]
+        found += [
+            f"loads.traction.{part}: the part is clamped and a traction on it does nothing; remove one of the two"
+            for part in self.loads.traction
+            if part in held
+        ]
         for key in ("displacement", "temperature"):
-            if self.contact.part in getattr(self.supports, key):
+            parts = getattr(self.supports, key)
+            if len(set(parts)) < len(parts):
+                found.append(f"supports.{key}: a part is named twice; name each once")
+            if self.contact.part in parts:
                 found.append(f"supports.{key}: '{self.contact.part}' is the contact part and cannot be held; remove it")
         return found
 
@@ -350,12 +364,23 @@ def build(data: dict[str, Any]) -> Scene:
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        raise SceneError("\n".join(dict.fromkeys(_sentence(e) for e in error.errors()))) from None
+        # a union of types gives one error a member: the first tells what is wrong
+        first: dict[str, str] = {}
+        for e in error.errors():
+            first.setdefault(_key(e), _sentence(e))
+        raise SceneError("\n".join(first.values())) from None
+
+
+def _where(error: Any) -> list[str]:
+    return [str(part) for part in error["loc"] if not str(part).startswith(("int", "list[", "constrained"))]
+
+
+def _key(error: Any) -> str:
+    return ".".join(_where(error)) or "scene"
 
 
 def _sentence(error: Any) -> str:
-    where = [str(part) for part in error["loc"] if not str(part).startswith(("int", "list[", "constrained"))]
-    key = ".".join(where) or "scene"
+    where, key = _where(error), _key(error)
     given = error.get("input")
     match error["type"]:
         case "extra_forbidden":

@@ -37,7 +37,8 @@ Body<d> random_body(unsigned seed, int points, double friction, double stiffness
   const Eigen::Index n = points * d;
   Eigen::MatrixXd root(n, n);
   for (double& entry : root.reshaped()) entry = random();
-  Body<d> body{root * root.transpose() / n + Eigen::MatrixXd::Identity(n, n), {{{stiffness}, {friction}}, 0.1, {}, Eigen::VectorXd(n)}};
+  Body<d> body{root * root.transpose() / n + Eigen::MatrixXd::Identity(n, n),
+               {{{stiffness}, {friction}}, 0.1, {}, Eigen::VectorXd(n)}};
   for (double& entry : body.problem.free) entry = random();
   for (int i = 0; i < points; ++i) {
     const Point<d> normal = random.point<d>().normalized(), displacement = 0.1 * random.point<d>();
@@ -85,7 +86,9 @@ TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite differenc
   for (int trial = 0; trial < 400; ++trial) {
     const ContactPoint<d> point{random.point<d>().normalized(), 0.5, 0.2 * random() + 0.1, Point<d>::Zero(), 0};
     const Point<d> f = 2 * random.point<d>(), w = random.point<d>();
-    const auto at = [&](const Point<d>& force, const Point<d>& velocity) { return residual<d>(law, point, k, alpha, beta, force, velocity); };
+    const auto at = [&](const Point<d>& force, const Point<d>& velocity) {
+      return residual<d>(law, point, k, alpha, beta, force, velocity);
+    };
     const auto here = at(f, w);
     Tensor2<d> by_force, by_velocity;
     bool kink = false;
@@ -110,13 +113,15 @@ TEST_CASE_TEMPLATE("the residual vanishes exactly on the law", D, Two, Three) {
   const ContactPoint<d> point{-Point<d>::Unit(d - 1), 0.5, 0.1, Point<d>::Zero(), 0};
   const double p = 0.5 * 50 * 0.1, k = 0.2;
   const Point<d> nu = point.normal, tau = Point<d>::Unit(0), still = Point<d>::Zero();
-  const auto size = [&](const Point<d>& f, const Point<d>& w) { return residual<d>(law, point, k, 0.3, 0.7, f, w).value.norm(); };
-  CHECK(size(p * nu + 0.3 * p * tau, still) <= 1e-14);        // sticks
-  CHECK(size(p * nu + 0.4 * p * tau, 2 * tau) <= 1e-14);      // slips, the body's force on the foundation along w
-  CHECK(size(p * nu - 0.4 * p * tau, 2 * tau) > 0.1);         // friction that pushes
-  CHECK(size(p * nu + 0.5 * p * tau, still) > 0.1);           // beyond the cone
-  CHECK(size(p * nu + 0.3 * p * tau, 2 * tau) > 0.1);         // slips below the bound
-  CHECK(size(still, -k * 10 * nu) <= 1e-14);                  // open
+  const auto size = [&](const Point<d>& f, const Point<d>& w) {
+    return residual<d>(law, point, k, 0.3, 0.7, f, w).value.norm();
+  };
+  CHECK(size(p * nu + 0.3 * p * tau, still) <= 1e-14);    // sticks
+  CHECK(size(p * nu + 0.4 * p * tau, 2 * tau) <= 1e-14);  // slips, the body's force on the foundation along w
+  CHECK(size(p * nu - 0.4 * p * tau, 2 * tau) > 0.1);     // friction that pushes
+  CHECK(size(p * nu + 0.5 * p * tau, still) > 0.1);       // beyond the cone
+  CHECK(size(p * nu + 0.3 * p * tau, 2 * tau) > 0.1);     // slips below the bound
+  CHECK(size(still, -k * 10 * nu) <= 1e-14);              // open
 }
 
 TEST_CASE_TEMPLATE("random bodies: the law within 1e-12, whatever it takes", D, Two, Three) {
@@ -146,8 +151,10 @@ TEST_CASE("three points: Newton, fixed point and enumeration agree") {
   for (unsigned seed = 100; seed < 130; ++seed) {
     const Body<2> body = random_body<2>(seed, 1 + static_cast<int>(seed % 3), 0.2);
     const Eigen::VectorXd guess = Eigen::VectorXd::Zero(body.problem.free.size());
-    ContactSolver<2> newton(body.compliance), slow(body.compliance, only(0, 20000, 0)), all(body.compliance, only(0, 0, 6));
-    const auto a = newton.solve(body.problem, guess), b = slow.solve(body.problem, guess), c = all.solve(body.problem, guess);
+    ContactSolver<2> newton(body.compliance), slow(body.compliance, only(0, 20000, 0)),
+        all(body.compliance, only(0, 0, 6));
+    const auto a = newton.solve(body.problem, guess), b = slow.solve(body.problem, guess),
+               c = all.solve(body.problem, guess);
     CAPTURE(seed);
     REQUIRE(a.converged);
     REQUIRE(b.converged);

@@ -23,8 +23,10 @@ Tensor2<d> random_symmetric(std::mt19937& random) {
 template <int d>
 Vertices<d> some_simplex() {
   Vertices<d> x;
-  if constexpr (d == 2) x << 0.1, -0.2, 1.3, 0.2, 0.4, 0.9;
-  else x << 0.1, -0.2, 0.3, 1.3, 0.2, 0.1, 0.4, 1.1, -0.1, 0.2, 0.3, 1.2;
+  if constexpr (d == 2)
+    x << 0.1, -0.2, 1.3, 0.2, 0.4, 0.9;
+  else
+    x << 0.1, -0.2, 0.3, 1.3, 0.2, 0.1, 0.4, 1.1, -0.1, 0.2, 0.3, 1.2;
   return x;
 }
 
@@ -40,7 +42,8 @@ double factorial(int n) { return std::tgamma(n + 1.0); }
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("Mandel form keeps tensors and their double contraction", D, std::integral_constant<int, 2>, std::integral_constant<int, 3>) {
+TEST_CASE_TEMPLATE("Mandel form keeps tensors and their double contraction", D, std::integral_constant<int, 2>,
+                   std::integral_constant<int, 3>) {
   constexpr int d = D::value;
   std::mt19937 random(1);
   const Tensor2<d> a = random_symmetric<d>(random), b = random_symmetric<d>(random);
@@ -64,7 +67,8 @@ TEST_CASE("simplex rules are exact to degree 2n-1, positive and inside") {
       CHECK(rule.barycentric.minCoeff() > 0);
       CHECK((rule.barycentric.rowwise().sum().array() - 1).abs().maxCoeff() <= 1e-14);
       const auto check = [&](int a, int b, int c) {
-        const Eigen::ArrayXd x = rule.barycentric.col(1), y = rule.barycentric.col(std::min(2, dim)), z = rule.barycentric.col(dim);
+        const Eigen::ArrayXd x = rule.barycentric.col(1), y = rule.barycentric.col(std::min(2, dim)),
+                             z = rule.barycentric.col(dim);
         const double found = (rule.weights.array() * x.pow(a) * y.pow(b) * z.pow(c)).sum();
         const double exact = factorial(dim) * factorial(a) * factorial(b) * factorial(c) / factorial(dim + a + b + c);
         CHECK(found == doctest::Approx(exact).epsilon(1e-12));
@@ -81,7 +85,8 @@ TEST_CASE("simplex rules are exact to degree 2n-1, positive and inside") {
   CHECK(std::abs((rule.weights.array() * rule.barycentric.col(1).array().pow(4)).sum() - 0.2) > 1e-4);
 }
 
-TEST_CASE_TEMPLATE("element kernels: rigid motions, affine fields and moments", D, std::integral_constant<int, 2>, std::integral_constant<int, 3>) {
+TEST_CASE_TEMPLATE("element kernels: rigid motions, affine fields and moments", D, std::integral_constant<int, 2>,
+                   std::integral_constant<int, 3>) {
   constexpr int d = D::value;
   std::mt19937 random(2);
   const Vertices<d> x = some_simplex<d>();
@@ -118,7 +123,8 @@ TEST_CASE_TEMPLATE("element kernels: rigid motions, affine fields and moments", 
     CHECK(m.sum() == doctest::Approx(s.volume).epsilon(1e-14));
     CHECK(m(0, 0) == doctest::Approx(2 * m(0, 1)).epsilon(1e-14));
     const Rule rule = simplex_rule(d, 2);
-    const Eigen::MatrixXd exact = s.volume * rule.barycentric.transpose() * rule.weights.asDiagonal() * rule.barycentric;
+    const Eigen::MatrixXd exact =
+        s.volume * rule.barycentric.transpose() * rule.weights.asDiagonal() * rule.barycentric;
     CHECK((m - exact).norm() <= 1e-14);
     const auto ones = affine<d>(x, Point<d>::Unit(1), Tensor2<d>::Zero());
     CHECK(ones.dot(vector_mass<d>(s) * ones) == doctest::Approx(s.volume).epsilon(1e-14));

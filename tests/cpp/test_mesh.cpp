@@ -36,7 +36,8 @@ void check_box(const std::array<int, d>& counts, const std::array<double, d>& le
       for (Eigen::Index f = 0; f < part.nodes.rows(); ++f) {
         sum += area_normal(mesh, part, f);
         for (int i = 0; i < d; ++i)
-          worst = std::max(worst, std::abs(mesh.nodes(part.nodes(f, i), static_cast<int>(a)) - (high ? lengths[a] : 0.0)));
+          worst =
+              std::max(worst, std::abs(mesh.nodes(part.nodes(f, i), static_cast<int>(a)) - (high ? lengths[a] : 0.0)));
       }
       CHECK(worst <= 1e-14);
       const Point<d> outward = (high ? 1 : -1) * exact / lengths[a] * Point<d>::Unit(static_cast<int>(a));
@@ -106,7 +107,8 @@ TEST_CASE("boxes: volume, orientation, parts and their outward normals") {
   CHECK_THROWS_AS(box<2>({1, 1}, {1, -1}, Diagonal::right), std::invalid_argument);
   CHECK_THROWS_AS(box<3>({1, 1, 1}, {1, 1, 1}, Diagonal::crisscross), std::invalid_argument);
   CHECK_THROWS_WITH_AS(box<2>({1, 1}, {1, 1}, Diagonal::right).part("roof"),
-                       "the mesh has no boundary part 'roof'; its parts are: bottom, left, right, top", std::invalid_argument);
+                       "the mesh has no boundary part 'roof'; its parts are: bottom, left, right, top",
+                       std::invalid_argument);
 }
 
 TEST_CASE("the right diagonal joins (0,0) and (1,1), the left one its mirror image") {
@@ -123,23 +125,59 @@ TEST_CASE("the right diagonal joins (0,0) and (1,1), the left one its mirror ima
 TEST_CASE("lists are refused by the first faulty entry") {
   CHECK(Lists().refusal() == "");
   Lists bad;
-  SUBCASE("not finite") { bad.nodes(2, 1) = NAN; CHECK(bad.names("node 2")); }
-  SUBCASE("infinite") { bad.nodes(3, 0) = INFINITY; CHECK(bad.names("node 3")); }
-  SUBCASE("duplicate") { bad.nodes.row(3) = bad.nodes.row(1); CHECK(bad.names("nodes 1 and 3")); }
-  SUBCASE("out of range") { bad.cells(1, 2) = 4; CHECK(bad.names("cell 1 names node 4")); }
-  SUBCASE("negative") { bad.cells(0, 0) = -1; CHECK(bad.names("cell 0 names node -1")); }
-  SUBCASE("inverted") { std::swap(bad.cells(1, 0), bad.cells(1, 1)); CHECK(bad.names("cell 1 is inverted")); }
-  SUBCASE("flat") { bad.nodes.row(2) << 0.5, 0.5; CHECK(bad.names("cell 1 is flat")); }
-  SUBCASE("node used twice in a cell") { bad.cells(0, 1) = 0; CHECK(bad.names("cell 0 is flat")); }
+  SUBCASE("not finite") {
+    bad.nodes(2, 1) = NAN;
+    CHECK(bad.names("node 2"));
+  }
+  SUBCASE("infinite") {
+    bad.nodes(3, 0) = INFINITY;
+    CHECK(bad.names("node 3"));
+  }
+  SUBCASE("duplicate") {
+    bad.nodes.row(3) = bad.nodes.row(1);
+    CHECK(bad.names("nodes 1 and 3"));
+  }
+  SUBCASE("out of range") {
+    bad.cells(1, 2) = 4;
+    CHECK(bad.names("cell 1 names node 4"));
+  }
+  SUBCASE("negative") {
+    bad.cells(0, 0) = -1;
+    CHECK(bad.names("cell 0 names node -1"));
+  }
+  SUBCASE("inverted") {
+    std::swap(bad.cells(1, 0), bad.cells(1, 1));
+    CHECK(bad.names("cell 1 is inverted"));
+  }
+  SUBCASE("flat") {
+    bad.nodes.row(2) << 0.5, 0.5;
+    CHECK(bad.names("cell 1 is flat"));
+  }
+  SUBCASE("node used twice in a cell") {
+    bad.cells(0, 1) = 0;
+    CHECK(bad.names("cell 0 is flat"));
+  }
   SUBCASE("orphan") {
     bad.nodes.conservativeResize(5, 2);
     bad.nodes.row(4) << 2, 2;
     CHECK(bad.names("node 4 belongs to no cell"));
   }
-  SUBCASE("inner facet") { bad.parts["floor"] << 0, 3; CHECK(bad.names("facet 0 of part 'floor'")); }
-  SUBCASE("facet out of range") { bad.parts["floor"] << 0, 9; CHECK(bad.names("facet 0 of part 'floor'")); }
-  SUBCASE("empty part") { bad.parts["floor"].resize(0, 2); CHECK(bad.names("'floor' has no facets")); }
-  SUBCASE("no cells") { bad.cells.resize(0, 3); CHECK(bad.names("no cells")); }
+  SUBCASE("inner facet") {
+    bad.parts["floor"] << 0, 3;
+    CHECK(bad.names("facet 0 of part 'floor'"));
+  }
+  SUBCASE("facet out of range") {
+    bad.parts["floor"] << 0, 9;
+    CHECK(bad.names("facet 0 of part 'floor'"));
+  }
+  SUBCASE("empty part") {
+    bad.parts["floor"].resize(0, 2);
+    CHECK(bad.names("'floor' has no facets"));
+  }
+  SUBCASE("no cells") {
+    bad.cells.resize(0, 3);
+    CHECK(bad.names("no cells"));
+  }
 }
 
 TEST_CASE("prolongation is exact between nested meshes and refuses others") {
@@ -149,7 +187,9 @@ TEST_CASE("prolongation is exact between nested meshes and refuses others") {
   }
   check_prolongation<2>(box<2>({4, 4}, {1, 1}, Diagonal::crisscross), box<2>({8, 8}, {1, 1}, Diagonal::crisscross));
   const Mesh<2> coarse = box<2>({2, 2}, {1, 1}, Diagonal::right);
-  const auto refuses = [&](const Mesh<2>& fine) { CHECK_THROWS_AS(prolongation<2>(coarse, fine), std::invalid_argument); };
+  const auto refuses = [&](const Mesh<2>& fine) {
+    CHECK_THROWS_AS(prolongation<2>(coarse, fine), std::invalid_argument);
+  };
   refuses(box<2>({3, 3}, {1, 1}, Diagonal::right));
   refuses(box<2>({4, 4}, {1, 1}, Diagonal::left));
   refuses(box<2>({4, 4}, {2, 1}, Diagonal::right));

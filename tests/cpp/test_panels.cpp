@@ -3,7 +3,6 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Sparse>
-
 #include <random>
 
 #include "warmslip/panels.hpp"
@@ -14,7 +13,8 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// `block` unknowns a node of an n x n grid, five-point couplings; negative pivots in the last component when `indefinite`.
+/// `block` unknowns a node of an n x n grid, five-point couplings; negative pivots in the last component when
+/// `indefinite`.
 Sparse grid_matrix(int n, int block, bool indefinite) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -31,7 +31,8 @@ Sparse grid_matrix(int n, int block, bool indefinite) {
     if (node % n + 1 < n) couple(node, node + 1);
     if (node + n < n * n) couple(node, node + n);
     couple(node, node);
-    for (int i = 0; i < block; ++i) entries.emplace_back(node * block + i, node * block + i, indefinite && i == block - 1 ? -12 * block : 12 * block);
+    for (int i = 0; i < block; ++i)
+      entries.emplace_back(node * block + i, node * block + i, indefinite && i == block - 1 ? -12 * block : 12 * block);
   }
   Sparse a(n * n * block, n * n * block);
   a.setFromTriplets(entries.begin(), entries.end());

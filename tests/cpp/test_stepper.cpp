@@ -35,8 +35,13 @@ struct Paper {
     return {std::move(mesh), material, {"top"}, cooled, "bottom", {{1e4}, {0.2}}, {quadrature}, 1};
   }
   explicit Paper(int n, double heating = 1, int quadrature = 0)
-      : mesh(unit_box(n)), problem(paper(mesh, heating, quadrature)), layout(PETSC_COMM_WORLD, mesh), operators(layout, problem),
-        surface(layout, problem), force(layout.vector(d)), heat(layout.vector(1)) {
+      : mesh(unit_box(n)),
+        problem(paper(mesh, heating, quadrature)),
+        layout(PETSC_COMM_WORLD, mesh),
+        operators(layout, problem),
+        surface(layout, problem),
+        force(layout.vector(d)),
+        heat(layout.vector(1)) {
     Point<d> weight = -Point<d>::Unit(d - 1), left = 0.4 * Point<d>::Unit(d - 1), right = left;
     left[0] = 1.4;
     right[0] = -0.8;
@@ -62,14 +67,16 @@ struct Paper {
       const Ledger& l = report.ledger;
       CHECK(std::max({l.energy_residual, l.heat_residual, l.force_residual}) <= 1e-11);
       CHECK(l.law_residual <= 1e-11);
-      CHECK(std::min({l.inertia_damping, l.elastic_damping, l.contact_damping, l.viscous, l.friction, l.heat_damping, l.conducted}) >= 0);
+      CHECK(std::min({l.inertia_damping, l.elastic_damping, l.contact_damping, l.viscous, l.friction, l.heat_damping,
+                      l.conducted}) >= 0);
       CHECK(report.open + report.stick + report.slip == surface.points());
     }
     CHECK(stepper.steps() == steps);
     CHECK(stepper.time() == doctest::Approx(1).epsilon(1e-14));
     CHECK(report.slip > 0);
     const Norms<d> norms(layout);
-    return {norms.v(stepper.level().u), norms.l2(stepper.level().w), norms.l2(stepper.level().theta), report.normal_force};
+    return {norms.v(stepper.level().u), norms.l2(stepper.level().w), norms.l2(stepper.level().theta),
+            report.normal_force};
   }
 };
 
@@ -86,7 +93,8 @@ template <int d>
 void check_factor(Paper<d>& paper, Mat matrix, Symmetry symmetry, int block, bool cholmod_serves) {
   const int ranks = static_cast<int>(paper.layout.sum(1.0));
   const auto trailing = paper.surface.unknowns(block);
-  const VecHandle right = paper.layout.vector(block), x = duplicate(right), product = duplicate(right), y = duplicate(right);
+  const VecHandle right = paper.layout.vector(block), x = duplicate(right), product = duplicate(right),
+                  y = duplicate(right);
   paper.layout.distribute(Eigen::VectorXd::LinSpaced(paper.mesh->nodes.rows() * block, -1, 2).array().sin(), right);
   const auto distance = [&](Vec a, Vec b) {
     PetscReal size, difference;
@@ -101,7 +109,8 @@ void check_factor(Paper<d>& paper, Mat matrix, Symmetry symmetry, int block, boo
   petsc->solve(right, x);
   WARMSLIP_PETSC(MatMult(matrix, x, product));
   CHECK(distance(product, right) <= 1e-11);
-  CHECK((compliance - compliance.transpose()).norm() <= (symmetry == Symmetry::general ? 1e9 : 1e-11) * compliance.norm());
+  CHECK((compliance - compliance.transpose()).norm() <=
+        (symmetry == Symmetry::general ? 1e9 : 1e-11) * compliance.norm());
   // the compliance is what a load on the held-apart unknowns moves them by
   const Eigen::VectorXd load = Eigen::VectorXd::LinSpaced(held.size(), 1, 2);
   petsc->reduce(right);
@@ -129,7 +138,8 @@ void check_factor(Paper<d>& paper, Mat matrix, Symmetry symmetry, int block, boo
 TEST_CASE_TEMPLATE("both backends factor the same operators", D, Two, Three) {
   constexpr int d = D::value;
   Paper<d> paper(d == 2 ? 6 : 3);
-  check_factor<d>(paper, momentum_matrix(paper.layout, paper.problem, paper.operators, 0.1), Symmetry::positive_definite, d, true);
+  check_factor<d>(paper, momentum_matrix(paper.layout, paper.problem, paper.operators, 0.1),
+                  Symmetry::positive_definite, d, true);
   const auto coupled = [&](Paper<d>& p, double scale, Symmetry symmetry, bool served) {
     check_factor<d>(p, coupled_matrix(p.layout, p.problem, p.operators, 0.1, scale), symmetry, d + 1, served);
   };
@@ -141,16 +151,25 @@ TEST_CASE_TEMPLATE("both backends factor the same operators", D, Two, Three) {
 }
 
 TEST_CASE("the plane problem: norms on any number of ranks, every coupling and quadrature") {
-  check_near(Paper<2>(8).run(8, Coupling::staggered), {0.0495886223914231, 0.0267642744764715, 0.898160618902909, 0.904968185665935});
-  check_near(Paper<2>(8).run(8, Coupling::lagged), {0.0495863711120781, 0.0267658292699907, 0.898147173550696, 0.904950892322555});
-  check_near(Paper<2>(8).run(8, Coupling::monolithic), {0.0493399993478305, 0.0267919934062631, 0.898137015288258, 0.907846547541927});
-  check_near(Paper<2>(8, -1).run(8, Coupling::monolithic), {0.0492981074834062, 0.0267760516730022, 0.89748528460677, 0.908002742864962});
-  check_near(Paper<2>(8, 1, 2).run(8, Coupling::staggered), {0.049588781597849, 0.0267560100406018, 0.898160727488345, 0.904939810305356});
-  check_near(Paper<2>(8).run(8, Coupling::staggered, Backend::petsc), {0.0495886223914232, 0.0267642744764716, 0.898160618902908, 0.904968185665936});
+  check_near(Paper<2>(8).run(8, Coupling::staggered),
+             {0.0495886223914231, 0.0267642744764715, 0.898160618902909, 0.904968185665935});
+  check_near(Paper<2>(8).run(8, Coupling::lagged),
+             {0.0495863711120781, 0.0267658292699907, 0.898147173550696, 0.904950892322555});
+  check_near(Paper<2>(8).run(8, Coupling::monolithic),
+             {0.0493399993478305, 0.0267919934062631, 0.898137015288258, 0.907846547541927});
+  check_near(Paper<2>(8, -1).run(8, Coupling::monolithic),
+             {0.0492981074834062, 0.0267760516730022, 0.89748528460677, 0.908002742864962});
+  check_near(Paper<2>(8, 1, 2).run(8, Coupling::staggered),
+             {0.049588781597849, 0.0267560100406018, 0.898160727488345, 0.904939810305356});
+  check_near(Paper<2>(8).run(8, Coupling::staggered, Backend::petsc),
+             {0.0495886223914232, 0.0267642744764716, 0.898160618902908, 0.904968185665936});
 }
 
 TEST_CASE("the block: norms on any number of ranks") {
-  check_near(Paper<3>(3).run(4, Coupling::staggered), {0.0685182367184955, 0.035939233734572, 0.404484873238518, 0.498623575304581});
-  check_near(Paper<3>(3, -1).run(4, Coupling::monolithic), {0.0682707127499522, 0.0359169669260807, 0.404600527785129, 0.500640793926774});
-  check_near(Paper<3>(3, 1, 2).run(4, Coupling::lagged), {0.068562728902031, 0.0358658061665048, 0.404470693603612, 0.498397879463677});
+  check_near(Paper<3>(3).run(4, Coupling::staggered),
+             {0.0685182367184955, 0.035939233734572, 0.404484873238518, 0.498623575304581});
+  check_near(Paper<3>(3, -1).run(4, Coupling::monolithic),
+             {0.0682707127499522, 0.0359169669260807, 0.404600527785129, 0.500640793926774});
+  check_near(Paper<3>(3, 1, 2).run(4, Coupling::lagged),
+             {0.068562728902031, 0.0358658061665048, 0.404470693603612, 0.498397879463677});
 }

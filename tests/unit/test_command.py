@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Command
+
 from warmslip.scene import load
 
 SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
@@ -16,10 +17,19 @@ SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
     ("arguments", "lines"),
     [
         (["paper_mixed", "--set", "contact.stifness=1"], ["contact.stifness: unknown key; did you mean 'stiffness'"]),
-        (["paper_mixed", "--set", "inertia.density=-1", "--set", "time.steps=nan"], ["time.steps", "inertia.density = -1"]),
-        (["paper_mixed", "--set", "inertia.density=0", "--set", "supports.displacement=[]"], ["the momentum operator is singular"]),
+        (
+            ["paper_mixed", "--set", "inertia.density=-1", "--set", "time.steps=nan"],
+            ["time.steps", "inertia.density = -1"],
+        ),
+        (
+            ["paper_mixed", "--set", "inertia.density=0", "--set", "supports.displacement=[]"],
+            ["the momentum operator is singular"],
+        ),
         (["nowhere.toml"], ["cannot read scene 'nowhere.toml'"]),
-        (["paper_mixed", *SMALL, "--set", "supports.displacement=['top','left']", "--set", "contact.part='flor'"], ["unknown boundary part"]),
+        (
+            ["paper_mixed", *SMALL, "--set", "supports.displacement=['top','left']", "--set", "contact.part='flor'"],
+            ["unknown boundary part", "a traction on it does nothing"],
+        ),
         (["paper_mixed", "--backend", "magic"], ["--backend 'magic' is unknown"]),
     ],
     ids=["unknown key", "two problems", "singular", "missing file", "unknown part", "backend"],

@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from petsc4py import PETSc
 from reference import scipy_scheme
+
 from warmslip import _core
 from warmslip.loads import Loads, evaluate
 from warmslip.problem import discretise, make_mesh, von_mises
@@ -35,7 +36,15 @@ def test_operators_equal_scipy(small: MakeScene, reading: str) -> None:
     scene = small(reading, mesh__n=n, contact__heat_exchange__conductance=k_c)
     d = discretise(scene)
     own, theirs = d.operators, scipy_scheme.operators(n, reading, k_c)
-    names = {"mass": "M", "elasticity": "A", "viscosity": "B", "conductivity": "D", "expansion": "G", "heating": "E", "exchange": "J"}
+    names = {
+        "mass": "M",
+        "elasticity": "A",
+        "viscosity": "B",
+        "conductivity": "D",
+        "expansion": "G",
+        "heating": "E",
+        "exchange": "J",
+    }
     for name, letter in names.items():
         assert relative(scipy_of(getattr(own, name)), theirs[letter]) <= 1e-13, name
     vector_mass = sp.kron(theirs["M"], np.eye(2))

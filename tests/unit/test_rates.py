@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from warmslip import judge, rates, readings
 from warmslip.errors import SUMS, TERMS
 from warmslip.runner import IDENTITIES
@@ -38,7 +39,9 @@ def test_bias_in_the_energy_norm() -> None:
     errors = [math.sqrt(n**-1.38 - REFERENCE**1.38) for n in LEVELS]
     for n, coarse, fine in zip(LEVELS, errors, errors[1:], strict=False):
         r = (1 / n) / REFERENCE
-        assert rates.observed(coarse, fine) == pytest.approx(0.5 * math.log2((r**1.38 - 1) / ((r / 2) ** 1.38 - 1)), rel=1e-12)
+        assert rates.observed(coarse, fine) == pytest.approx(
+            0.5 * math.log2((r**1.38 - 1) / ((r / 2) ** 1.38 - 1)), rel=1e-12
+        )
         assert rates.corrected(coarse, fine, 1 / n, REFERENCE, quadratic=True) == pytest.approx(0.69, abs=1e-9)
 
 
@@ -77,7 +80,9 @@ def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> l
     for n in (*LEVELS, 256):
         e = dict.fromkeys([*TERMS, *SUMS], scale * n**-order)
         row = {"n": n, "steps": n, "h": 1 / n, "k": 1 / n, "outcome": "right"} | {f"e_{t}": v for t, v in e.items()}
-        row |= {name: larger for name in ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2")}
+        row |= dict.fromkeys(
+            ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2"), larger
+        )
         rows.append(row | {f"identity_{i}": 1e-15 for i in IDENTITIES})
     return rows
 
@@ -86,7 +91,12 @@ def test_readings_judge_the_claims(tmp_path: Path) -> None:
     def case(name: str, **how: float) -> Path:
         return write(tmp_path / f"{name}_staggered.csv", study_rows(**how))
 
-    paths = [case("good_0"), case("good_10", larger=2), case("slow_0", order=0.5), case("slow_10", order=0.5, larger=0.5)]
+    paths = [
+        case("good_0"),
+        case("good_10", larger=2),
+        case("slow_0", order=0.5),
+        case("slow_10", order=0.5, larger=0.5),
+    ]
     paths.append(write(tmp_path / "good_10_lagged.csv", study_rows(larger=0.1)))
     good, slow = readings.table(paths)
     assert (good["reading"], slow["reading"]) == ("good", "slow")

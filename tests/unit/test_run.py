@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 import warmslip
 from warmslip import Loads, Run, Scene, Trajectory, _core, runner
 from warmslip.problem import discretise
@@ -129,15 +130,22 @@ def test_a_state_that_is_not_finite_is_said(small: MakeScene) -> None:
     assert all(np.isfinite(getattr(result, name)).all() for name in FIELDS)
 
 
-def test_an_identity_that_is_violated_stops_the_run(small: MakeScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "residuals", lambda report: dict.fromkeys(runner.IDENTITIES, 1e-8))
+@pytest.mark.parametrize("name", runner.IDENTITIES)
+@pytest.mark.parametrize("value", [1e-8, float("nan")])
+def test_an_identity_that_is_violated_stops_the_run(
+    small: MakeScene, monkeypatch: pytest.MonkeyPatch, name: str, value: float
+) -> None:
+    monkeypatch.setattr(runner, "residuals", lambda report: dict.fromkeys(runner.IDENTITIES, 0.0) | {name: value})
     result = warmslip.run(small())
+    assert not result.summary["identities"][name] <= 1e-11
     assert (result.outcome, result.summary["steps"]) == ("identity_violated", 1)
 
 
 @pytest.mark.parametrize("coupling", ["staggered", "lagged", "monolithic"])
 def test_restart_gives_the_same_end(small: MakeScene, tmp_path: Path, coupling: str) -> None:
-    scene = small(mesh__n=6, time__steps=8, time__coupling=coupling, contact__heat_exchange__foundation_temperature=10.0)
+    scene = small(
+        mesh__n=6, time__steps=8, time__coupling=coupling, contact__heat_exchange__foundation_temperature=10.0
+    )
     whole = warmslip.run(scene, out=tmp_path)
     d = discretise(scene)
     stepper = d.stepper()

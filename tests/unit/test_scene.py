@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 import tomli_w
+
 from warmslip.scene import Scene, SceneError, build, library, load
 
 REFUSED = [
@@ -55,6 +56,8 @@ REFUSED = [
     ("contact.stiffness=-1", "contact.stiffness = -1"),
     ("contact.stiffness=inf", "contact.stiffness: inf is not a finite number"),
     ("contact.stiffness='stiff'", "contact.stiffness"),
+    ("contact.stiffness='1e4'", "contact.stiffness"),
+    ("inertia.density=true", "inertia.density"),
     ("contact.gap=nan", "contact.gap"),
     ("contact.quadrature='simpson'", "contact.quadrature"),
     ("contact.quadrature='gauss-9'", "contact.quadrature"),
@@ -103,7 +106,12 @@ def test_all_problems_at_once() -> None:
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [(None, "cannot read scene"), ("mesh = {", "is not valid TOML"), ("", "mesh: missing; add it"), (b"\xff\xfe\x00", "not a text file")],
+    [
+        (None, "cannot read scene"),
+        ("mesh = {", "is not valid TOML"),
+        ("", "mesh: missing; add it"),
+        (b"\xff\xfe\x00", "not a text file"),
+    ],
 )
 def test_refuses_files(tmp_path: Path, text: str | bytes | None, words: str) -> None:
     path = tmp_path / "scene.toml"
@@ -124,7 +132,12 @@ def test_library_scenes_load_and_say_what_they_are() -> None:
 def test_the_paper_has_its_data() -> None:
     ones, identity = [[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0]]
     minus = [[-1.0, -1.0], [-1.0, -1.0]]
-    expected = {"printed": (ones, ones, ones), "mixed": (identity, ones, ones), "isotropic": (identity,) * 3, "consistent": (identity, ones, minus)}
+    expected = {
+        "printed": (ones, ones, ones),
+        "mixed": (identity, ones, ones),
+        "isotropic": (identity,) * 3,
+        "consistent": (identity, ones, minus),
+    }
     for reading, tensors in expected.items():
         s = load(f"paper_{reading}")
         assert (s.heat.conductivity, s.heat.expansion.tensor, s.heat.heating.tensor) == tensors
@@ -139,8 +152,16 @@ def test_the_paper_has_its_data() -> None:
 
 
 def test_overrides(small: Callable[..., Scene]) -> None:
-    s = load("paper_mixed", ["mesh.n=64", "time.coupling=lagged", "loads.traction.left=[1.0, 2.0]", "initial.velocity=[0.0,1.0]"])
-    assert (s.mesh.n, s.time.coupling, s.loads.traction["left"], s.initial.velocity) == (64, "lagged", [1.0, 2.0], [0.0, 1.0])
+    s = load(
+        "paper_mixed",
+        ["mesh.n=64", "time.coupling=lagged", "loads.traction.left=[1.0, 2.0]", "initial.velocity=[0.0,1.0]"],
+    )
+    assert (s.mesh.n, s.time.coupling, s.loads.traction["left"], s.initial.velocity) == (
+        64,
+        "lagged",
+        [1.0, 2.0],
+        [0.0, 1.0],
+    )
     assert s.override(**{"mesh.n": 8}).mesh.n == 8
     assert s.mesh.n == 64
     assert s.override(**{"mesh.n": 8}).digest() != s.digest() == s.override(**{"mesh.n": 64}).digest()

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import warmslip
 from reference import scipy_scheme
+
+import warmslip
 from warmslip import Trajectory
 
 N = STEPS = 8
@@ -17,12 +18,14 @@ FIELDS = ("u", "w", "theta")
 
 
 def scene(reading: str, foundation: float, coupling: str) -> warmslip.Scene:
-    return warmslip.load(f"paper_{reading}").override(**{
-        "mesh.n": N,
-        "time.steps": STEPS,
-        "time.coupling": coupling,
-        "contact.heat_exchange.foundation_temperature": foundation,
-    })
+    return warmslip.load(f"paper_{reading}").override(
+        **{
+            "mesh.n": N,
+            "time.steps": STEPS,
+            "time.coupling": coupling,
+            "contact.heat_exchange.foundation_temperature": foundation,
+        }
+    )
 
 
 @pytest.mark.parametrize(("reading", "foundation", "coupling"), CASES)
@@ -65,14 +68,22 @@ def test_the_cases_differ_and_meet_every_status(tmp_path: Path) -> None:
     assert statuses == {0, 1, 2}
 
 
-@pytest.mark.parametrize(("mu", "c_nu", "k_c", "rho"), [(0.0, 1e4, 1.0, 1.0), (2.0, 1e6, 0.0, 1.0), (0.5, 10.0, 1e3, 0.0)])
+@pytest.mark.parametrize(
+    ("mu", "c_nu", "k_c", "rho"), [(0.0, 1e4, 1.0, 1.0), (2.0, 1e6, 0.0, 1.0), (0.5, 10.0, 1e3, 0.0)]
+)
 def test_other_constants(mu: float, c_nu: float, k_c: float, rho: float) -> None:
     theirs = scipy_scheme.simulate("isotropic", 10.0, N, STEPS, mu=mu, c_nu=c_nu, k_c=k_c, rho=rho, keep="final")
-    ours = warmslip.run(scene("isotropic", 10.0, "staggered").override(**{
-        "contact.friction.coefficient": mu,
-        "contact.stiffness": c_nu,
-        "contact.heat_exchange.conductance": k_c,
-        "inertia.density": rho,
-    }))
+    ours = warmslip.run(
+        scene("isotropic", 10.0, "staggered").override(
+            **{
+                "contact.friction.coefficient": mu,
+                "contact.stiffness": c_nu,
+                "contact.heat_exchange.conductance": k_c,
+                "inertia.density": rho,
+            }
+        )
+    )
     assert ours.outcome == "right"
-    assert ours.summary["norms"] == pytest.approx(scipy_scheme.norms(N, theirs.u[-1], theirs.w[-1], theirs.theta[-1]), rel=1e-10)
+    assert ours.summary["norms"] == pytest.approx(
+        scipy_scheme.norms(N, theirs.u[-1], theirs.w[-1], theirs.theta[-1]), rel=1e-10
+    )

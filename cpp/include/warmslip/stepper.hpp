@@ -16,7 +16,7 @@ struct StepperOptions {
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
-  double refinement = 2e-12;             ///< balances worse than this get one step of iterative refinement, relative
+  double refinement = 5e-12;             ///< balances worse than this get one step of iterative refinement, relative
 };
 
 /// Load vectors of one step: `force` (f, v), `heat` (q, eta) with k_c theta_F on Gamma_C included, `gap` g (points).

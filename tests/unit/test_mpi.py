@@ -1,0 +1,54 @@
+"""Two processes give the answer of one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from conftest import Command
+
+from warmslip import Trajectory
+
+CASES = {
+    "plane": ["paper_mixed", "mesh.n=8", "time.steps=8", "contact.heat_exchange.foundation_temperature=10"],
+    "plane, Gauss points, monolithic": [
+        "paper_consistent",
+        "mesh.n=8",
+        "time.steps=4",
+        "contact.quadrature=gauss-2",
+        "time.coupling=monolithic",
+    ],
+    "block": ["block_3d", "mesh.n=3", "time.steps=4"],
+}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("case", CASES)
+def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, case: str) -> None:
+    scene, *overrides = CASES[case]
+    options = [word for override in overrides for word in ("--set", override)]
+    summaries, ends = [], []
+    for ranks in (1, 2):
+        result = command("run", scene, *options, "--out", f"run{ranks}", ranks=ranks)
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.count("right:") == 1
+        summaries.append(json.loads((tmp_path / f"run{ranks}/summary.json").read_text()))
+        with Trajectory(tmp_path / f"run{ranks}/trajectory.h5") as t:
+            ends.append([t.u[-1], t.w[-1], t.theta[-1], t.series("contact")["force"][-1]])
+    one, two = summaries
+    assert two["stamp"]["ranks"] == 2
+    assert two["norms"] == pytest.approx(one["norms"], rel=1e-10)
+    for name in ("normal_force", "tangential_force", "max_penetration", "open", "stick", "slip"):
+        assert two["contact"][name] == pytest.approx(one["contact"][name], rel=1e-9), name
+    assert all(summary["identities"][i] <= 1e-11 for summary in summaries for i in ("energy", "heat", "force", "law"))
+    for a, b in zip(*ends, strict=True):  # mesh numbering: field by field, point by point
+        assert abs(a - b).max() <= 1e-9 * abs(a).max()
+
+
+@pytest.mark.mpi
+def test_refusals_are_said_once(command: Command) -> None:
+    result = command("run", "paper_mixed", "--set", "mesh.n=0.5", "--out", "run", ranks=2)
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    assert result.stderr.count("mesh.n = 0.5: input should be a valid integer") == 1

@@ -1,0 +1,152 @@
+"""Balances and contact law at every step, for every reading, coupling and quadrature, and at the edges of the data."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from reference import scipy_scheme
+
+import warmslip
+from warmslip import Loads, Scene, Trajectory
+
+IDENTITIES = ("energy", "heat", "force", "law")
+COUPLINGS = scipy_scheme.COUPLINGS
+CASES = list(itertools.product(scipy_scheme.READINGS, COUPLINGS, ("nodal", "gauss-2")))
+DISSIPATIONS = (
+    "inertia_damping",
+    "elastic_damping",
+    "contact_damping",
+    "viscous",
+    "friction",
+    "heat_damping",
+    "conducted",
+)
+
+
+def scene(reading: str = "mixed", **keys: Any) -> Scene:
+    values = {"mesh.n": 8, "time.steps": 8, "contact.heat_exchange.foundation_temperature": 10.0}
+    return warmslip.load(f"paper_{reading}").override(**values | {k.replace("__", "."): v for k, v in keys.items()})
+
+
+def check(one: Scene, **how: Any) -> warmslip.Result:
+    result = warmslip.run(one, **how)
+    assert result.outcome == "right"
+    worst = {name: result.summary["identities"][name] for name in IDENTITIES}
+    assert max(worst.values()) <= 1e-11 + result.summary["identities"]["law_floor"], worst
+    assert max(v for k, v in worst.items() if k != "law") <= 1e-11, worst
+    return result
+
+
+@pytest.mark.parametrize(("reading", "coupling", "quadrature"), CASES)
+def test_balances(tmp_path: Path, reading: str, coupling: str, quadrature: str) -> None:
+    check(scene(reading, time__coupling=coupling, contact__quadrature=quadrature), out=tmp_path)
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        ledger = t.series("ledger")
+    for name in DISSIPATIONS:
+        assert (ledger[name] >= -1e-15 * np.abs(ledger["load_work"]).max()).all(), name
+    for name in ("energy", "heat", "force", "law"):
+        assert (ledger[f"{name}_residual"] <= 1e-11).all()
+    # the energy balance once more, from the terms in the file
+    out = (
+        "kinetic_change",
+        "elastic_change",
+        "contact_change",
+        "inertia_damping",
+        "elastic_damping",
+        "contact_damping",
+        "viscous",
+        "friction",
+    )
+    left = sum(ledger[n] for n in out) - sum(ledger[n] for n in ("load_work", "expansion_work", "gap_work"))
+    assert np.abs(left).max() <= 1e-12 * max(np.abs(ledger[n]).max() for n in out)
+    left = (
+        sum(ledger[n] for n in ("heat_change", "heat_damping", "conducted", "exchanged"))
+        - ledger["supplied"]
+        - ledger["heating"]
+    )
+    assert np.abs(left).max() <= 1e-12 * np.abs(ledger["supplied"]).max()
+
+
+def test_opposite_coupling_cancels() -> None:
+    """R = -M, monolithic: what expansion takes from the motion, heating gives to the heat, term by term."""
+    job = warmslip.Run(scene("consistent", time__coupling="monolithic"))
+    for report in job.steps():
+        assert report.ledger.heating == pytest.approx(-report.ledger.expansion_work, rel=1e-11)
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_balances_in_space(coupling: str) -> None:
+    values = {"mesh.n": 3, "time.steps": 4, "time.coupling": coupling}
+    result = check(warmslip.load("block_3d").override(**values))
+    assert result.summary["contact"]["slip"] > 0
+
+
+@pytest.mark.parametrize("diagonal", ["left", "crisscross"])
+def test_balances_on_other_meshes(diagonal: str) -> None:
+    check(scene("printed", mesh__diagonal=diagonal, mesh__n=[9, 5], mesh__lengths=[2.0, 1.0]))
+
+
+@pytest.mark.parametrize("quadrature", ["nodal", "gauss-2"])
+def test_without_friction(tmp_path: Path, quadrature: str) -> None:
+    result = check(scene(contact__friction__coefficient=0.0, contact__quadrature=quadrature), out=tmp_path)
+    assert result.summary["contact"]["tangential_force"] == 0
+    assert result.summary["contact"]["normal_force"] > 0
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        assert (t.series("contact")["force"][..., 0] == 0).all()
+        assert (t.series("ledger")["friction"] == 0).all()
+
+
+def test_without_exchange_the_foundation_is_not_felt() -> None:
+    cold, hot = (
+        check(scene(contact__heat_exchange__conductance=0.0, contact__heat_exchange__foundation_temperature=f))
+        for f in (0.0, 10.0)
+    )
+    np.testing.assert_array_equal(cold.theta, hot.theta)
+    np.testing.assert_array_equal(cold.u, hot.u)
+
+
+def test_perfect_exchange_holds_the_foundation_temperature() -> None:
+    """With the sides free: where a cold side meets it, the consistent exchange matrix projects, and overshoots."""
+    result = check(scene(contact__heat_exchange__conductance=1e9, supports__temperature=["top"]))
+    assert result.theta[:9] == pytest.approx(10, rel=1e-5)
+
+
+def test_moving_gap() -> None:
+    """A foundation that comes and goes: the work of the gap closes the books."""
+    one = scene("isotropic", time__steps=16)
+    loads = replace(Loads.of(one), gap=lambda x, t: 1e-3 * np.sin(9 * t) + 1e-3 * x[:, 0])
+    check(one, loads=loads)
+
+
+@pytest.mark.parametrize(
+    "edge",
+    [
+        {"inertia__density": 0.0},
+        {"viscosity__lame": [0.0, 0.0]},
+        {"heat__expansion__tensor": [[0.0, 0.0], [0.0, 0.0]]},
+        {"contact__stiffness": 0.0},
+        {"contact__gap": 1.0},
+        {"contact__gap": -0.01},
+        {"time__steps": 1},
+        {"time__end": 1e-6},
+        {"time__end": 1e3},
+        {"mesh__n": 1, "mesh__lengths": [1.0, 1.0]},
+        {"contact__friction__coefficient": 3.0},
+        {"supports__displacement": []},
+        {
+            "loads__body": [0.0, 0.0],
+            "loads__traction": {},
+            "heat__source": 0.0,
+            "contact__heat_exchange__foundation_temperature": 0.0,
+        },
+    ],
+    ids=lambda e: " ".join(f"{k}={v}" for k, v in e.items()),
+)
+@pytest.mark.parametrize("coupling", ["staggered", "monolithic"])
+def test_edges_of_the_data(edge: dict[str, Any], coupling: str) -> None:
+    check(scene(time__coupling=coupling, **edge))
