@@ -22,29 +22,48 @@ void bind(py::module_& m) {
 
   using S = Stepper<d>;
   py::class_<S, std::shared_ptr<S>>(m, name<d>("Stepper").c_str(), "Backward Euler with a fixed step (collective).")
-      .def(py::init([](const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface,
-                       double k, Coupling coupling, Backend backend, const ContactOptions& contact) {
-             return std::make_shared<S>(layout, problem, operators, surface, StepperOptions{k, coupling, backend, contact});
-           }), py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("surface"), py::kw_only(), py::arg("k"),
+      .def(py::init([](const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                       const ContactSurface<d>& surface, double k, Coupling coupling, Backend backend,
+                       const ContactOptions& contact) {
+             return std::make_shared<S>(layout, problem, operators, surface,
+                                        StepperOptions{k, coupling, backend, contact});
+           }),
+           py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("surface"), py::kw_only(), py::arg("k"),
            py::arg("coupling"), py::arg("backend"), py::arg("contact"), py::keep_alive<1, 2>(), py::keep_alive<1, 3>(),
            py::keep_alive<1, 4>(), py::keep_alive<1, 5>())
       .def("start", &S::start, py::arg("u"), py::arg("w"), py::arg("theta"), py::arg("gap"), py::arg("time"))
-      .def("advance", [](S& s, Vec force, Vec heat, const Eigen::VectorXd& gap) { return s.advance({force, heat, gap}); },
-           py::arg("force"), py::arg("heat"), py::arg("gap"), "One step; the state stays when the outcome is not right.")
-      .def_property_readonly("u", [](const S& s) { return share(s.level().u); }, "Displacement. The vectors change owner at every step: ask again.")
-      .def_property_readonly("w", [](const S& s) { return share(s.level().w); }, "Velocity.")
-      .def_property_readonly("theta", [](const S& s) { return share(s.level().theta); }, "Temperature.")
+      .def(
+          "advance",
+          [](S& s, Vec force, Vec heat, const Eigen::VectorXd& gap) {
+            return s.advance({force, heat, gap});
+          },
+          py::arg("force"), py::arg("heat"), py::arg("gap"), "One step; the state stays when the outcome is not right.")
+      .def_property_readonly(
+          "u", [](const S& s) { return share(s.level().u); },
+          "Displacement. The vectors change owner at every step: ask again.")
+      .def_property_readonly(
+          "w", [](const S& s) { return share(s.level().w); }, "Velocity.")
+      .def_property_readonly(
+          "theta", [](const S& s) { return share(s.level().theta); }, "Temperature.")
       .def_property_readonly("time", &S::time)
-      .def_property_readonly("contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")
-      .def_property_readonly("contact_displacement", [](const S& s) { return s.level().contact_u; }, "(d points)")
-      .def_property_readonly("status", [](const S& s) {
-        std::vector<int> status;
-        for (const Status one : s.status()) status.push_back(static_cast<int>(one));
-        return status;
-      }, "0 open, 1 stick, 2 slip, a point")
+      .def_property_readonly(
+          "contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")
+      .def_property_readonly(
+          "contact_displacement", [](const S& s) { return s.level().contact_u; }, "(d points)")
+      .def_property_readonly(
+          "status",
+          [](const S& s) {
+            std::vector<int> status;
+            for (const Status one : s.status()) status.push_back(static_cast<int>(one));
+            return status;
+          },
+          "0 open, 1 stick, 2 slip, a point")
       .def_property_readonly("cost", &S::cost)
-      .def_property_readonly("momentum_factor", [](S& s) -> Factor& { return s.momentum_factor(); }, py::return_value_policy::reference_internal)
-      .def_property_readonly("heat_factor", [](S& s) { return s.heat_factor(); }, py::return_value_policy::reference_internal)
+      .def_property_readonly(
+          "momentum_factor", [](S& s) -> Factor& { return s.momentum_factor(); },
+          py::return_value_policy::reference_internal)
+      .def_property_readonly(
+          "heat_factor", [](S& s) { return s.heat_factor(); }, py::return_value_policy::reference_internal)
       .def_property_readonly("solver", &S::solver, "The factorizations in words.");
 }
 
@@ -58,7 +77,9 @@ void bind_stepper(py::module_& m) {
   py::enum_<Outcome>(m, "Outcome")
       .value("right", Outcome::right)
       .value("contact_not_converged", Outcome::contact_not_converged)
-      .value("not_finite", Outcome::not_finite);
+      .value("not_finite", Outcome::not_finite)
+      .value("identity_violated", Outcome::identity_violated)
+      .value("precision_lost", Outcome::precision_lost);
   py::enum_<Stage>(m, "Stage")
       .value("none", Stage::none)
       .value("newton", Stage::newton)
@@ -105,7 +126,8 @@ void bind_stepper(py::module_& m) {
   term("law_floor", &Ledger::law_floor);
   ledger.attr("terms") = py::tuple(terms);
 
-  auto cost = py::class_<Cost>(m, "Cost", "What a run cost so far: CPU seconds of this process, counts, bytes of the factors.");
+  auto cost =
+      py::class_<Cost>(m, "Cost", "What a run cost so far: CPU seconds of this process, counts, bytes of the factors.");
   py::list items;
   const auto item = [&](const char* attribute, auto member) {
     cost.def_readonly(attribute, member);

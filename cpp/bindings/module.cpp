@@ -13,14 +13,17 @@ void check_petsc() {
                     theirs[1].cast<int>() == minor;
   if (!same)
     throw py::import_error("warmslip was built with PETSc " + std::to_string(PETSC_VERSION_MAJOR) + "." +
-                           std::to_string(PETSC_VERSION_MINOR) + ", but PETSc " + std::to_string(major) + "." + std::to_string(minor) +
-                           " is loaded and petsc4py was built with " + py::str(theirs).cast<std::string>() + "; run `make setup`");
+                           std::to_string(PETSC_VERSION_MINOR) + ", but PETSc " + std::to_string(major) + "." +
+                           std::to_string(minor) + " is loaded and petsc4py was built with " +
+                           py::str(theirs).cast<std::string>() + "; run `make setup`");
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_core, m) {
-  m.doc() = "The compiled core of warmslip: meshes, operators on PETSc, the contact solver and the time stepper, for d = 2 and 3.";
+  m.doc() =
+      "The compiled core of warmslip: meshes, operators on PETSc, the contact solver and the time stepper, for d = 2 "
+      "and 3.";
   py::module_::import("petsc4py.PETSc");  // initialises PETSc and MPI
   check_petsc();
   py::register_exception_translator([](std::exception_ptr p) {
@@ -31,7 +34,8 @@ PYBIND11_MODULE(_core, m) {
       PyErr_SetObject(error.ptr(), error(e.code).ptr());
     }
   });
-  m.attr("petsc_version") = std::to_string(PETSC_VERSION_MAJOR) + "." + std::to_string(PETSC_VERSION_MINOR) + "." + std::to_string(PETSC_VERSION_SUBMINOR);
+  m.attr("petsc_version") = std::to_string(PETSC_VERSION_MAJOR) + "." + std::to_string(PETSC_VERSION_MINOR) + "." +
+                            std::to_string(PETSC_VERSION_SUBMINOR);
   m.attr("compiler") = "g++ " __VERSION__;
   bind_mesh(m);
   bind_problem(m);

@@ -240,34 +240,45 @@ def schema() -> None:
 
 
 def main() -> None:
-    """Entry point: expected errors become one line and exit code 2; anything else keeps its traceback under WARMSLIP_DEBUG."""
+    """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
     try:
         app(standalone_mode=True)
-    except (SceneError, ValueError) as error:
-        _stop(str(error), 2)
-    except OSError as error:
-        _stop(f"{error.strerror}: {error.filename}; check the path", 2)
-    except (RuntimeError, MemoryError) as error:
+    except SceneError as error:  # every rank reads the same scene and refuses it alike
+        _say(str(error), everywhere=False)
+        sys.exit(2)
+    except Exception as error:
         if os.environ.get("WARMSLIP_DEBUG"):
             raise
-        _stop(str(error) or "out of memory; use a coarser mesh", 1)
-    except Exception:
-        # a rank that fails alone would leave the others waiting for ever
-        if int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1"))) > 1:
-            from mpi4py import MPI
+        message, code = _explain(error)
+        _say(message, everywhere=True)
+        from mpi4py import MPI
 
-            console.print_exception()
-            MPI.COMM_WORLD.Abort(1)
-        raise
+        if MPI.COMM_WORLD.size > 1:  # a rank that ends alone would leave the others waiting for ever
+            sys.stderr.flush()
+            MPI.COMM_WORLD.Abort(code)
+        sys.exit(code)
 
 
-def _stop(message: str, code: int) -> None:
+def _explain(error: Exception) -> tuple[str, int]:
+    """A sentence and an exit code: 2 for what the user can mend in the call, 1 for a run that failed."""
+    if isinstance(error, OSError):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"cannot read or write a file{where}: {error.strerror or error}; check the path and its rights", 2
+    if isinstance(error, ValueError):
+        return str(error), 2
+    if isinstance(error, MemoryError):
+        return "out of memory; use a coarser mesh or more machines", 1
+    if isinstance(error, RuntimeError):
+        return str(error), 1
+    return f"{type(error).__name__}: {error}; this is a defect, WARMSLIP_DEBUG=1 shows where", 1
+
+
+def _say(message: str, *, everywhere: bool) -> None:
     from mpi4py import MPI
 
-    if MPI.COMM_WORLD.rank == 0:
+    if everywhere or MPI.COMM_WORLD.rank == 0:
         for line in message.splitlines():
-            console.print(f"[red]error:[/red] {line}", highlight=False, soft_wrap=True, markup=True)
-    sys.exit(code)
+            console.print(f"error: {line}", highlight=False, soft_wrap=True, markup=False)
 
 
 if __name__ == "__main__":

@@ -92,6 +92,8 @@ class Discretisation:
             self.layout.distribute(values.ravel(), vector)
         gap = evaluate(self.loads.gap, self.surface.positions, time, 1)[:, 0]
         stepper.start(*vectors, gap, time)
+        for vector in vectors:
+            vector.destroy()  # petsc4py would only mark it for a later collection
         return stepper
 
     def field(self, vec: Any) -> Array:

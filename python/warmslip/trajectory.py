@@ -21,13 +21,16 @@ LEDGER = tuple(_core.Ledger.terms)
 class TrajectoryWriter:
     """Appends steps as they come and flushes each, so that an interrupted run is readable to its last step.
 
-    Gathering is collective; rank 0 alone writes.
+    States are stored every `output.every` steps; the last good one always, also when a step raised. Gathering is
+    collective, rank 0 alone writes; without a path nothing is written.
     """
 
-    def __init__(self, path: Path, discretisation: Discretisation, rank: int) -> None:
-        self._d, self._rank = discretisation, rank
+    def __init__(self, path: Path | None, discretisation: Discretisation, stepper: Any, comm: Any) -> None:
+        self._d, self._stepper = discretisation, stepper
         self._file: h5py.File | None = None
-        if rank != 0:
+        self._writing, self._stored = path is not None, -1
+        self._alone = comm.size == 1
+        if path is None or comm.rank != 0:
             return
         d, points = discretisation.dim, len(discretisation.surface.weights)
         nodes = len(discretisation.mesh.nodes)
@@ -66,8 +69,9 @@ class TrajectoryWriter:
         dataset.resize(len(dataset) + 1, axis=0)
         dataset[-1] = value
 
-    def state(self, stepper: Any) -> None:
-        """Appends the fields (collective)."""
+    def _state(self) -> None:
+        stepper = self._stepper
+        self._stored = stepper.cost.steps
         fields = {name: self._d.field(getattr(stepper, name)) for name in ("u", "w", "theta")}
         if self._file is None:
             return
@@ -76,33 +80,39 @@ class TrajectoryWriter:
             self._append(f"states/{name}", values)
         self._file.flush()
 
-    def step(self, stepper: Any, report: Any) -> None:
-        """Appends the report, the ledger and the contact points of a step."""
-        if self._file is None:
-            return
-        self._append("steps/time", stepper.time)
-        for name in REPORT:
-            self._append(f"steps/{name}", getattr(report, name))
-        self._append("steps/friction_traction", report.friction_traction)
-        for name in LEDGER:
-            self._append(f"ledger/{name}", getattr(report.ledger, name))
-        shape = (-1, self._d.dim)
-        self._append("contact/force", np.reshape(stepper.contact_force, shape))
-        self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
-        self._append("contact/status", stepper.status)
-
-    def fields(self, stepper: Any) -> None:
-        """Writes the von Mises stress of the present state, (cells,) in `fields/mises` (collective)."""
-        mises = self._d.mises(stepper)
+    def step(self, report: Any) -> None:
+        """Appends the report, the ledger and the contact points of the step just taken, and its state when due (collective)."""
+        stepper, scene = self._stepper, self._d.scene
         if self._file is not None:
-            self._file["fields/mises"] = mises
+            self._append("steps/time", stepper.time)
+            for name in REPORT:
+                self._append(f"steps/{name}", getattr(report, name))
+            self._append("steps/friction_traction", report.friction_traction)
+            for name in LEDGER:
+                self._append(f"ledger/{name}", getattr(report.ledger, name))
+            shape = (-1, self._d.dim)
+            self._append("contact/force", np.reshape(stepper.contact_force, shape))
+            self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
+            self._append("contact/status", stepper.status)
+            self._file.flush()
+        if self._writing and stepper.cost.steps % scene.output.every == 0:
+            self._state()
 
     def __enter__(self) -> Self:
+        if self._writing:
+            self._state()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # after an error on one of many ranks the others are elsewhere, and gathering would wait for them
+        if self._writing and (kind is None or self._alone):
+            if self._stored != self._stepper.cost.steps:
+                self._state()
+            mises = self._d.mises(self._stepper)
+            if self._file is not None:
+                self._file["fields/mises"] = mises
         if self._file is not None:
             self._file.close()
 

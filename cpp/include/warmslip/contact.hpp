@@ -34,11 +34,11 @@ enum class Status : std::int8_t { open, stick, slip };
 /// What the law reads at one contact point of weight `weight` during one step of size `k`.
 template <int d>
 struct ContactPoint {
-  Point<d> normal;       ///< outward unit normal of the body
-  double weight;         ///< quadrature weight, area
-  double penetration;    ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
-  Point<d> displacement; ///< u_{n-1}, for the round-off floor of r alone
-  double gap;            ///< g_n
+  Point<d> normal;        ///< outward unit normal of the body
+  double weight;          ///< quadrature weight, area
+  double penetration;     ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
+  Point<d> displacement;  ///< u_{n-1}, for the round-off floor of r alone
+  double gap;             ///< g_n
 };
 
 /// Residual and generalised derivative of the law, written so that zero is the law itself (Alart & Curnier,

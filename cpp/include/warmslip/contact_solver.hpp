@@ -9,11 +9,11 @@
 namespace warmslip {
 
 struct ContactOptions {
-  double tolerance = 1e-12;   ///< on the residual of the contact law, relative
-  int newton_steps = 40;      ///< undamped, then again with a line search
+  double tolerance = 1e-12;  ///< on the residual of the contact law, relative
+  int newton_steps = 40;     ///< undamped, then again with a line search
   int fixed_point_steps = 4000;
-  int enumerate_points = 6;   ///< enumerate the statuses of at most so many points (d = 2)
-  double proximal = 0;        ///< > 0 where contact points outnumber contact nodes; dimensionless
+  int enumerate_points = 6;  ///< enumerate the statuses of at most so many points (d = 2)
+  double proximal = 0;       ///< > 0 where contact points outnumber contact nodes; dimensionless
 };
 
 /// Which safeguard produced the answer.
@@ -22,30 +22,33 @@ enum class Stage : std::int8_t { none, newton, line_search, fixed_point, enumera
 template <int d>
 struct ContactProblem {
   ContactLaw law;
-  double step;                         ///< k, time
+  double step;  ///< k, time
   std::vector<ContactPoint<d>> points;
-  Eigen::VectorXd free;                ///< (d points), velocity without contact force
+  Eigen::VectorXd free;  ///< (d points), velocity without contact force
+  double scale = 0;      ///< a force of the problem's size, such as stops `free`: what no force is compared with
 };
 
 template <int d>
 struct ContactSolution {
-  Eigen::VectorXd force, velocity;     ///< (d points)
+  Eigen::VectorXd force, velocity;  ///< (d points)
   std::vector<Status> status;
   bool converged = false;
   Stage stage = Stage::none;
-  int iterations = 0;                  ///< Newton steps of all stages
-  int factorizations = 0;              ///< of the dense tangent
-  double law_residual = 0;             ///< of the contact law, relative; accepted up to tolerance + floor
-  double floor = 0;                    ///< round-off of evaluating the law: c_nu eps |u| over the largest pressure
+  int iterations = 0;       ///< Newton steps of all stages
+  int factorizations = 0;   ///< of the dense tangent
+  double law_residual = 0;  ///< of the contact law, relative; accepted up to tolerance + floor
+  double floor = 0;         ///< round-off of evaluating the law: c_nu eps |u| over the largest pressure
 };
 
 /// How far (force, velocity) is from the law, relative to the largest force and the largest free velocity: the worst of
-/// |lambda_nu - p_nu(r_n)|, (|lambda_tau| - T)^+ and T |w_tau| - lambda_tau . w_tau over the points. `floor` receives what
-/// the rounding of r alone can cause: no digits of the pressure below c_nu eps |u| can be had.
+/// |lambda_nu - p_nu(r_n)|, (|lambda_tau| - T)^+ and T |w_tau| - lambda_tau . w_tau over the points. `floor` receives
+/// what the rounding of r alone can cause: no digits of the pressure below c_nu eps |u| can be had.
 template <int d>
-double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity, double* floor);
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
+                    double* floor);
 
-/// One body, law and step size. Remembers the dense tangent while the statuses stay (d = 2), which is most steps of most runs.
+/// One body, law and step size. Remembers the dense tangent while the statuses stay (d = 2), which is most steps of
+/// most runs.
 template <int d>
 class ContactSolver {
  public:
@@ -55,6 +58,8 @@ class ContactSolver {
   ContactSolution<d> solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force);
 
   const Eigen::MatrixXd& compliance() const { return compliance_; }
+  /// The force a point that stops the velocities `free` must bear.
+  double scale(const Eigen::VectorXd& free) const { return spectral_ > 0 ? free.cwiseAbs().maxCoeff() / spectral_ : 0; }
 
  private:
   struct Linearisation;
@@ -67,9 +72,9 @@ class ContactSolver {
 
   Eigen::MatrixXd compliance_;
   ContactOptions options_;
-  Eigen::VectorXd reach_;             // row sums of |compliance|
-  double spectral_ = 0;               // their largest, a bound on the eigenvalues of the compliance
-  std::vector<int> factored_;         // statuses the tangent below belongs to
+  Eigen::VectorXd reach_;      // row sums of |compliance|
+  double spectral_ = 0;        // their largest, a bound on the eigenvalues of the compliance
+  std::vector<int> factored_;  // statuses the tangent below belongs to
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };
 

@@ -1,4 +1,5 @@
-// Gamma_C in a discretised body: where the contact law is evaluated, with which weights, and how forces reach the nodes.
+// Gamma_C in a discretised body: where the contact law is evaluated, with which weights, and how forces reach the
+// nodes.
 #pragma once
 #include <Eigen/Sparse>
 
@@ -20,7 +21,8 @@ class ContactSurface {
   const Eigen::VectorXd& weights() const { return weights_; }   ///< (points), area
   bool nodal() const { return nodal_; }
 
-  /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d nodes).
+  /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d
+  /// nodes).
   std::vector<PetscInt> unknowns(int block) const;
   /// Displacement-like values of the contact nodes, (d nodes), on every rank.
   Eigen::VectorXd nodal_values(Vec v) const;

@@ -34,10 +34,10 @@ class Factor {
   int substitutions_ = 0;
 };
 
-/// Factors `k`. `trailing` are global scalar indices, the same on every rank. On one rank CHOLMOD is used when it is there
-/// and the matrix is symmetric, with the trailing unknowns ordered last, so that a step costs exactly one forward and one
-/// backward substitution and C comes free with the last block; otherwise PETSc's KSP under `prefix` (default MUMPS).
-/// `block` is the number of unknowns a node.
+/// Factors `k`. `trailing` are global scalar indices, the same on every rank. On one rank CHOLMOD is used when it is
+/// there and the matrix is symmetric, with the trailing unknowns ordered last, so that a step costs exactly one forward
+/// and one backward substitution and C comes free with the last block; otherwise PETSc's KSP under `prefix` (default
+/// MUMPS). `block` is the number of unknowns a node.
 std::unique_ptr<Factor> factor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block,
                                const std::string& prefix, Backend backend = Backend::automatic);
 

@@ -8,6 +8,7 @@ namespace warmslip {
 std::unique_ptr<Factor> factor_with_cholmod(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block);
 
 /// PETSc's KSP under `prefix`, any number of ranks: two solves a step, and one for each column of C.
-std::unique_ptr<Factor> factor_with_petsc(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix);
+std::unique_ptr<Factor> factor_with_petsc(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry,
+                                          const std::string& prefix);
 
 }  // namespace warmslip

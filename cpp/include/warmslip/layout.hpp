@@ -17,9 +17,9 @@ class Layout {
   MPI_Comm comm() const { return comm_; }
   const Mesh<d>& mesh() const { return *mesh_; }
   Eigen::Index cells() const { return cells_.rows(); }
-  const IndexTable<d + 1>& local_cells() const { return cells_; }      ///< (cells, d+1) local nodes
-  const std::vector<Index>& mesh_cells() const { return mesh_cells_; } ///< mesh number of every local cell
-  const std::vector<Index>& mesh_nodes() const { return mesh_nodes_; } ///< mesh number of every local node
+  const IndexTable<d + 1>& local_cells() const { return cells_; }       ///< (cells, d+1) local nodes
+  const std::vector<Index>& mesh_cells() const { return mesh_cells_; }  ///< mesh number of every local cell
+  const std::vector<Index>& mesh_nodes() const { return mesh_nodes_; }  ///< mesh number of every local node
   const std::vector<PetscInt>& global_nodes() const { return global_nodes_; }
   PetscInt owned() const { return owned_; }
   PetscInt global_of(Index mesh_node) const { return global_of_mesh_[static_cast<std::size_t>(mesh_node)]; }

@@ -8,35 +8,37 @@ namespace warmslip {
 
 /// What the ledger reads of one time level.
 struct Level {
-  VecHandle u, w, theta;                                       ///< displacement, velocity, temperature
-  VecHandle mass_w, elastic_u, mass_theta;                     ///< M w (without rho), A u, M theta
-  VecHandle expansion_theta, heating_w;                        ///< G theta, E w
-  Eigen::VectorXd contact_u, gap;                              ///< u at the contact points (d points), g (points)
+  VecHandle u, w, theta;                    ///< displacement, velocity, temperature
+  VecHandle mass_w, elastic_u, mass_theta;  ///< M w (without rho), A u, M theta
+  VecHandle expansion_theta, heating_w;     ///< G theta, E w
+  Eigen::VectorXd contact_u, gap;           ///< u at the contact points (d points), g (points)
 };
 
 /// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0.
 struct Ledger {
-  double kinetic, elastic, contact;                            ///< stored at the end of the step
+  double kinetic, elastic, contact;  ///< stored at the end of the step
   double kinetic_change, elastic_change, contact_change;
-  double inertia_damping, elastic_damping, contact_damping;    ///< backward Euler's own dissipation
+  double inertia_damping, elastic_damping, contact_damping;  ///< backward Euler's own dissipation
   double viscous, friction;
   double load_work, expansion_work, gap_work;
-  double heat_change, heat_damping, conducted, exchanged, supplied, heating;  ///< the same balance for theta
+  double heat_change, heat_damping, conducted, exchanged, supplied, heating;       ///< the same balance for theta
   double energy_residual, heat_residual, force_residual, law_residual, law_floor;  ///< relative to the largest term
 };
 
 struct StepInputs {
   double k;
-  Vec force, heat;                     ///< load vectors
-  Vec expansion_theta, heating_w;      ///< the ones the coupling used
-  Eigen::VectorXd contact_force;          ///< at the points, (d points)
-  Eigen::VectorXd contact_free;           ///< velocity the points would have without contact, for the law's scale
+  Vec force, heat;                 ///< load vectors
+  Vec expansion_theta, heating_w;  ///< the ones the coupling used
+  Eigen::VectorXd contact_force;   ///< at the points, (d points)
+  Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the law's scale
+  double contact_scale;            ///< and a force of that size
 };
 
 template <int d>
 class Bookkeeper {
  public:
-  Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface);
+  Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+             const ContactSurface<d>& surface);
 
   /// Closes the books of the step from `before` to `after` (collective).
   Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
@@ -49,7 +51,8 @@ class Bookkeeper {
   void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   double heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  void resultants(const Level& before, const Level& after, const StepInputs& inputs, double heat_energy, Ledger& ledger);
+  void resultants(const Level& before, const Level& after, const StepInputs& inputs, double heat_energy,
+                  Ledger& ledger);
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;
@@ -58,6 +61,7 @@ class Bookkeeper {
   VecHandle viscous_w_, conducted_, exchanged_, contact_force_;  // B w, D theta, J theta, E lambda
   std::vector<PetscInt> unknowns_;                               // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;                           // a node
+  Point<d> centroid_;                                            // moments are taken about it
 };
 
 }  // namespace warmslip

@@ -24,9 +24,9 @@ struct Facets {
 
 template <int d>
 struct Mesh {
-  RealTable<d> nodes;                        ///< (nodes, d), length
-  IndexTable<d + 1> cells;                   ///< (cells, d+1), positively oriented
-  std::map<std::string, Facets<d>> parts;    ///< named parts of the boundary
+  RealTable<d> nodes;                      ///< (nodes, d), length
+  IndexTable<d + 1> cells;                 ///< (cells, d+1), positively oriented
+  std::map<std::string, Facets<d>> parts;  ///< named parts of the boundary
 
   /// The part called `name`; std::invalid_argument names the parts there are when it is missing.
   const Facets<d>& part(const std::string& name) const;
@@ -35,8 +35,8 @@ struct Mesh {
 enum class Diagonal { right, left, crisscross };
 
 /// The box [0,L1] x .. x [0,Ld] in counts[0] x .. x counts[d-1] bricks, each cut along its diagonal (0..0)-(1..1) for
-/// `right` (Kuhn's cut, nested under halving in any d), its mirror image in x for `left`, or both for `crisscross` (d = 2).
-/// Parts: left, right (x), bottom, top (the last axis), and front, back (y) for d = 3.
+/// `right` (Kuhn's cut, nested under halving in any d), its mirror image in x for `left`, or both for `crisscross` (d =
+/// 2). Parts: left, right (x), bottom, top (the last axis), and front, back (y) for d = 3.
 template <int d>
 Mesh<d> box(const std::array<int, d>& counts, const std::array<double, d>& lengths, Diagonal diagonal);
 

@@ -14,14 +14,14 @@ template <int d>
 struct Operators {
   Operators(const Layout<d>& layout, const Problem<d>& problem);
 
-  MatHandle mass;          ///< (theta, eta), consistent
-  MatHandle vector_mass;   ///< rho (w, v), the same matrix for every component
-  MatHandle elasticity;    ///< a(u, v)
-  MatHandle viscosity;     ///< b(w, v)
-  MatHandle conductivity;  ///< d(theta, eta)
-  MatHandle expansion;     ///< m(theta, v): rows v, columns theta
-  MatHandle heating;       ///< e(w, eta): rows eta, columns w
-  MatHandle exchange;      ///< int k_c theta eta over Gamma_C, consistent
+  MatHandle mass;                 ///< (theta, eta), consistent
+  MatHandle vector_mass;          ///< rho (w, v), the same matrix for every component
+  MatHandle elasticity;           ///< a(u, v)
+  MatHandle viscosity;            ///< b(w, v)
+  MatHandle conductivity;         ///< d(theta, eta)
+  MatHandle expansion;            ///< m(theta, v): rows v, columns theta
+  MatHandle heating;              ///< e(w, eta): rows eta, columns w
+  MatHandle exchange;             ///< int k_c theta eta over Gamma_C, consistent
   std::vector<PetscInt> clamped;  ///< global scalar indices with u = 0, owned by this rank
   std::vector<PetscInt> cooled;   ///< global nodes with theta = 0, owned by this rank
 };
@@ -36,7 +36,8 @@ MatHandle heat_matrix(const Operators<d>& operators, double k);
 
 /// Both in one, with block size d+1, (w, theta) a node: [K, -G; -scale E, scale H], for the monolithic coupling.
 template <int d>
-MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k, double scale);
+MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k,
+                         double scale);
 
 /// Quadrature points of the rank's cells or of the facets of a part, and the load vector of data given there.
 template <int d>
@@ -50,15 +51,18 @@ class LoadQuadrature {
   VecHandle load(const RealTable<Eigen::Dynamic>& values) const;
   /// Squared L2 distance of the P1 function `field` to `values`, summed over the ranks.
   double squared_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const;
-  /// Squared distance of eps(field) to the symmetric part of the gradients `values` (points, d*d), d/dx_j of component i at i*d+j.
+  /// Squared distance of eps(field) to the symmetric part of the gradients `values` (points, d*d), d/dx_j of component
+  /// i at i*d+j.
   double squared_strain_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const;
 
  private:
+  void expect(const RealTable<Eigen::Dynamic>& values, Vec field, Eigen::Index components) const;
+
   const Layout<d>& layout_;
   Rule rule_;
   RealTable<d> positions_;
-  IndexTable<Eigen::Dynamic> nodes_;   // local nodes of every cell or facet
-  std::vector<Eigen::Index> cells_;    // local cell of every cell or facet
+  IndexTable<Eigen::Dynamic> nodes_;  // local nodes of every cell or facet
+  std::vector<Eigen::Index> cells_;   // local cell of every cell or facet
   Eigen::VectorXd measures_;
 };
 

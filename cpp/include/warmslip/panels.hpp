@@ -1,8 +1,8 @@
 // Triangular substitution with a sparse L D L^T whose columns are gathered into dense panels.
 //
-// Columns of equal structure (the unknowns of one node, and of whole separators) share one list of rows, so a sweep reads
-// eight bytes an entry in unit stride. A step's cost is two such sweeps, and their cost is memory traffic: this halves the
-// time of CHOLMOD's own substitution for one right-hand side, which is why it is not left to the library.
+// Columns of equal structure (the unknowns of one node, and of whole separators) share one list of rows, so a sweep
+// reads eight bytes an entry in unit stride. A step's cost is two such sweeps, and their cost is memory traffic: this
+// halves the time of CHOLMOD's own substitution for one right-hand side, which is why it is not left to the library.
 #pragma once
 #include <cstddef>
 #include <vector>
@@ -12,7 +12,8 @@ namespace warmslip {
 class Panels {
  public:
   Panels() = default;
-  /// From the columns of L with D on its diagonal, row indices ascending: column j holds entries start[j] .. + count[j].
+  /// From the columns of L with D on its diagonal, row indices ascending: column j holds entries start[j] .. +
+  /// count[j].
   Panels(std::size_t n, const int* start, const int* count, const int* index, const double* value);
 
   /// x <- L^-1 x, in place; (n).
@@ -24,12 +25,12 @@ class Panels {
 
  private:
   struct Panel {
-    int first, width, rows;       // columns first .. first + width, and `rows` rows below them
-    std::size_t row, value;       // where its rows and values begin
+    int first, width, rows;  // columns first .. first + width, and `rows` rows below them
+    std::size_t row, value;  // where its rows and values begin
   };
   std::vector<Panel> panels_;
   std::vector<int> rows_;
-  std::vector<double> values_;    // a panel: strict lower triangle by columns, then rows x width by columns
+  std::vector<double> values_;  // a panel: strict lower triangle by columns, then rows x width by columns
   std::vector<double> inverse_pivots_;
   mutable std::vector<double> work_;
 };

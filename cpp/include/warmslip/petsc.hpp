@@ -3,7 +3,6 @@
 #include <petscksp.h>
 
 #include <Eigen/Dense>
-
 #include <memory>
 #include <stdexcept>
 #include <string>

@@ -9,14 +9,18 @@ namespace warmslip {
 /// Which time level the coupling terms take: (theta_{n-1}, w_n), (theta_{n-1}, w_{n-1}) or (theta_n, w_n).
 enum class Coupling { staggered, lagged, monolithic };
 
-enum class Outcome { right, contact_not_converged, not_finite };
+/// `precision_lost`: the stiffness is so large that rounding of the displacement hides the pressure, see
+/// Ledger::law_floor.
+enum class Outcome { right, contact_not_converged, not_finite, identity_violated, precision_lost };
 
 struct StepperOptions {
-  double k;                              ///< time step
+  double k;  ///< time step
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
-  double refinement = 5e-12;             ///< balances worse than this get one step of iterative refinement, relative
+  double refinement = 5e-12;     ///< balances worse than this get one step of iterative refinement, relative
+  double identity_bound = 1e-9;  ///< a step whose balances are worse is not right
+  double floor_bound = 1e-6;     ///< nor is one whose contact law can be evaluated no better than this
 };
 
 /// Load vectors of one step: `force` (f, v), `heat` (q, eta) with k_c theta_F on Gamma_C included, `gap` g (points).
@@ -31,18 +35,19 @@ struct StepReport {
   Stage stage = Stage::none;
   int newton_iterations = 0;
   int open = 0, stick = 0, slip = 0;
-  double max_penetration = 0;                      ///< length
-  double normal_force = 0;                         ///< int p_nu, force
-  Point<d> traction = Point<d>::Zero();            ///< int sigma nu over Gamma_C: the foundation's force on the body
-  Point<d> friction_traction = Point<d>::Zero();   ///< its tangential part
+  double max_penetration = 0;                     ///< length
+  double normal_force = 0;                        ///< int p_nu, force
+  Point<d> traction = Point<d>::Zero();           ///< int sigma nu over Gamma_C: the foundation's force on the body
+  Point<d> friction_traction = Point<d>::Zero();  ///< its tangential part
   Ledger ledger{};
 };
 
 /// What a run costs, so far.
 struct Cost {
-  double setup_seconds = 0, step_seconds = 0;      ///< CPU of this process
+  double setup_seconds = 0, step_seconds = 0;                          ///< CPU of this process
   double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0;  ///< parts of step_seconds
-  int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0, newton_iterations = 0;
+  int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0,
+      newton_iterations = 0;
   double factor_bytes = 0;
 };
 
@@ -65,7 +70,7 @@ class Stepper {
   const std::vector<Status>& status() const { return status_; }
   const Cost& cost() const { return cost_; }
   Factor& momentum_factor() { return *momentum_; }
-  Factor* heat_factor() { return heat_.get(); }       ///< nullptr when monolithic
+  Factor* heat_factor() { return heat_.get(); }  ///< nullptr when monolithic
   std::string solver() const;
 
  private:
@@ -74,6 +79,7 @@ class Stepper {
   bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
                      ContactSolution<d>& solution);
   void solve_heat(const StepLoads& loads, Vec heating_w, Vec theta);
+  Outcome judge(const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
   bool refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact);
   void split(Vec coupled, Vec w, Vec theta) const;
@@ -87,11 +93,11 @@ class Stepper {
   StepperOptions options_;
   Bookkeeper<d> books_;
   double coupled_scale_ = 1;
-  std::unique_ptr<Factor> momentum_, heat_;   // monolithic: momentum_ holds both fields
+  std::unique_ptr<Factor> momentum_, heat_;  // monolithic: momentum_ holds both fields
   std::unique_ptr<ContactSolver<d>> contact_;
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
-  Eigen::VectorXd free_;                      // velocity of the contact points without contact force
+  Eigen::VectorXd free_;  // velocity of the contact points without contact force
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   double time_ = 0;

@@ -1,7 +1,8 @@
 // Second- and fourth-order symmetric tensors as plain Eigen values.
 //
-// Strains and stresses travel in Mandel form, (e11, e22, sqrt2 e12) or (e11, e22, e33, sqrt2 e23, sqrt2 e13, sqrt2 e12),
-// because there the double contraction of the paper is the ordinary dot product and a fourth-order tensor is a matrix.
+// Strains and stresses travel in Mandel form, (e11, e22, sqrt2 e12) or (e11, e22, e33, sqrt2 e23, sqrt2 e13, sqrt2
+// e12), because there the double contraction of the paper is the ordinary dot product and a fourth-order tensor is a
+// matrix.
 #pragma once
 #include <Eigen/Dense>
 #include <array>
@@ -9,7 +10,7 @@
 namespace warmslip {
 
 template <int d>
-inline constexpr int mandel_size = d * (d + 1) / 2;
+inline constexpr int mandel_size = d*(d + 1) / 2;
 
 template <int d>
 using Point = Eigen::Matrix<double, d, 1>;

@@ -39,7 +39,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   std::map<Index, std::vector<std::size_t>> at_node;  // vertex rule: points that differ in normal only stay apart
   const auto add_shape = [&](std::size_t point, Index node, double value) {
     if (const auto found = number.find(node); found != number.end())
-      for (int a = 0; a < d; ++a) shape.emplace_back(static_cast<int>(point) * d + a, static_cast<int>(found->second) * d + a, value);
+      for (int a = 0; a < d; ++a)
+        shape.emplace_back(static_cast<int>(point) * d + a, static_cast<int>(found->second) * d + a, value);
   };
   const auto new_point = [&](const Point<d>& x, const Point<d>& nu, double weight) {
     positions.push_back(x);
@@ -55,7 +56,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
         const Index node = facets.nodes(f, i);
         if (!number.contains(node)) continue;
         auto& here = at_node[node];
-        const auto same = std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
+        const auto same =
+            std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
         if (same != here.end()) {
           weights[*same] += area.norm() / d;
         } else {

@@ -4,9 +4,7 @@
 
 namespace warmslip {
 
-void Factor::solve(Vec r, Vec x) {
-  expand(Eigen::VectorXd::Zero(reduce(r).size()), x);
-}
+void Factor::solve(Vec r, Vec x) { expand(Eigen::VectorXd::Zero(reduce(r).size()), x); }
 
 std::unique_ptr<Factor> factor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block,
                                const std::string& prefix, Backend backend) {
@@ -14,10 +12,13 @@ std::unique_ptr<Factor> factor(Mat k, const std::vector<PetscInt>& trailing, Sym
   MPI_Comm_size(PetscObjectComm(reinterpret_cast<PetscObject>(k)), &size);
   const bool possible = size == 1 && symmetry != Symmetry::general;
   if (backend == Backend::cholmod && !possible)
-    throw std::invalid_argument("the CHOLMOD backend needs one rank and a symmetric operator; use backend 'petsc' or 'automatic'");
+    throw std::invalid_argument(
+        "the CHOLMOD backend needs one rank and a symmetric operator; use backend 'petsc' or 'automatic'");
   if (possible && backend != Backend::petsc) {
     if (auto sequential = factor_with_cholmod(k, trailing, symmetry, block)) return sequential;
-    if (backend == Backend::cholmod) throw std::runtime_error("CHOLMOD is not in this build or could not factor the " + prefix + " operator");
+    symmetry = Symmetry::symmetric;  // it was not definite after all
+    if (backend == Backend::cholmod)
+      throw std::runtime_error("CHOLMOD is not in this build or could not factor the " + prefix + " operator");
   }
   return factor_with_petsc(k, trailing, symmetry, prefix);
 }

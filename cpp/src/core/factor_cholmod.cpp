@@ -72,13 +72,14 @@ class CholmodFactor final : public Factor {
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_GIVEN;
     common_.postorder = 0;  // it would move the trailing unknowns
-    // A symmetric matrix that may be indefinite (quasi-definite) needs L D L^T from the start; a definite one is factored
-    // quicker in dense blocks as L L^T and then brought to the same form.
+    // A symmetric matrix that may be indefinite (quasi-definite) needs L D L^T from the start; a definite one is
+    // factored quicker in dense blocks as L L^T and then brought to the same form.
     const bool definite = symmetry == Symmetry::positive_definite;
     common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     for (int i = 0; i < 3; ++i) common_.nrelax[i] = 0, common_.zrelax[i] = 0;  // every stored zero would be substituted
     factor_ = cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_);
-    usable_ = factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
+    usable_ =
+        factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
     usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_, &common_);
     if (!usable_) return;
     last_block();
@@ -100,7 +101,8 @@ class CholmodFactor final : public Factor {
   Eigen::VectorXd reduce(Vec r) override {
     {
       Values values(r);
-      for (std::size_t i = 0; i < permutation_.size(); ++i) half_[static_cast<Eigen::Index>(i)] = (*values)[permutation_[i]];
+      for (std::size_t i = 0; i < permutation_.size(); ++i)
+        half_[static_cast<Eigen::Index>(i)] = (*values)[permutation_[i]];
     }
     panels_.forward(half_.data());
     ++substitutions_;
@@ -111,7 +113,8 @@ class CholmodFactor final : public Factor {
     if (held_ > 0) half_.tail(held_) -= last_.triangularView<Eigen::UnitLower>().solve(load);
     panels_.backward(half_.data());
     Values values(x);
-    for (std::size_t i = 0; i < permutation_.size(); ++i) (*values)[permutation_[i]] = half_[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < permutation_.size(); ++i)
+      (*values)[permutation_[i]] = half_[static_cast<Eigen::Index>(i)];
   }
 
   const Eigen::MatrixXd& compliance() override {
@@ -127,7 +130,8 @@ class CholmodFactor final : public Factor {
   }
 
  private:
-  // Isolated (clamped) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing ones.
+  // Isolated (clamped) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing
+  // ones.
   std::vector<int> ordering(const Triangle& a, const std::vector<PetscInt>& trailing, int n, int block) {
     std::vector<bool> last(static_cast<std::size_t>(n), false);
     for (const PetscInt i : trailing) last[static_cast<std::size_t>(i)] = true;
@@ -180,8 +184,10 @@ class CholmodFactor final : public Factor {
     for (Eigen::Index j = 0; j < held_; ++j) {
       const auto column = interior_ + j;
       for (int e = start[column]; e < start[column] + count[column]; ++e) {
-        if (index[e] == column) pivots_[j] = value[e];
-        else last_(index[e] - interior_, j) = value[e];
+        if (index[e] == column)
+          pivots_[j] = value[e];
+        else
+          last_(index[e] - interior_, j) = value[e];
       }
     }
   }
@@ -220,7 +226,8 @@ class CholmodFactor final : public Factor {
 
 }  // namespace
 
-std::unique_ptr<Factor> factor_with_cholmod(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block) {
+std::unique_ptr<Factor> factor_with_cholmod(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry,
+                                            int block) {
   auto factor = std::make_unique<CholmodFactor>(k, trailing, symmetry, block);
   if (!factor->usable()) return nullptr;
   return factor;

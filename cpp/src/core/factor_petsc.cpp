@@ -24,7 +24,8 @@ class PetscFactor final : public Factor {
     WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
     work_ = duplicate(right_);
 
-    WARMSLIP_PETSC(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(trailing.size()), trailing.data(), PETSC_COPY_VALUES, indices_.out()));
+    WARMSLIP_PETSC(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(trailing.size()), trailing.data(),
+                                   PETSC_COPY_VALUES, indices_.out()));
     WARMSLIP_PETSC(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(trailing.size()), held_.out()));
     WARMSLIP_PETSC(VecScatterCreate(free_, indices_, held_, nullptr, scatter_.out()));
     trailing_ = trailing;
@@ -63,6 +64,7 @@ class PetscFactor final : public Factor {
   }
 
   double bytes() const override {
+    if (!direct()) return 0;
     PC pc;
     Mat factored;
     MatInfo info;
@@ -75,14 +77,24 @@ class PetscFactor final : public Factor {
   std::string description() const override {
     PC pc;
     PCType type;
-    MatSolverType package;
+    MatSolverType package = nullptr;
     WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
     WARMSLIP_PETSC(PCGetType(pc, &type));
-    WARMSLIP_PETSC(PCFactorGetMatSolverType(pc, &package));
-    return std::string("PETSc ") + type + " by " + (package ? package : "petsc");
+    if (direct()) WARMSLIP_PETSC(PCFactorGetMatSolverType(pc, &package));
+    return std::string("PETSc ") + type + (package ? std::string(" by ") + package : "");
   }
 
  private:
+  // a direct solver, unless the options say otherwise
+  bool direct() const {
+    PC pc;
+    PetscBool lu, cholesky;
+    WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
+    WARMSLIP_PETSC(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCLU, &lu));
+    WARMSLIP_PETSC(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCCHOLESKY, &cholesky));
+    return lu || cholesky;
+  }
+
   Eigen::VectorXd held(Vec from) {
     WARMSLIP_PETSC(VecScatterBegin(scatter_, from, held_, INSERT_VALUES, SCATTER_FORWARD));
     WARMSLIP_PETSC(VecScatterEnd(scatter_, from, held_, INSERT_VALUES, SCATTER_FORWARD));
@@ -95,7 +107,8 @@ class PetscFactor final : public Factor {
     WARMSLIP_PETSC(VecSet(work_, 0));
     Values values(work_);
     for (std::size_t i = 0; i < trailing_.size(); ++i)
-      if (trailing_[i] >= begin && trailing_[i] < end) (*values)[trailing_[i] - begin] = load[static_cast<Eigen::Index>(i)];
+      if (trailing_[i] >= begin && trailing_[i] < end)
+        (*values)[trailing_[i] - begin] = load[static_cast<Eigen::Index>(i)];
   }
 
   KspHandle ksp_;
@@ -108,7 +121,8 @@ class PetscFactor final : public Factor {
 
 }  // namespace
 
-std::unique_ptr<Factor> factor_with_petsc(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix) {
+std::unique_ptr<Factor> factor_with_petsc(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry,
+                                          const std::string& prefix) {
   return std::make_unique<PetscFactor>(k, trailing, symmetry, prefix);
 }
 

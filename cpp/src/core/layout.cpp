@@ -37,7 +37,8 @@ Layout<d>::Layout(MPI_Comm comm, std::shared_ptr<const Mesh<d>> mesh) : mesh_(st
   const auto nodes = static_cast<std::size_t>(mesh_->nodes.rows());
   std::vector<std::pair<Index, bool>> present;  // mesh node, ghost
   for (std::size_t i = 0; i < mesh_nodes_.size(); ++i) present.emplace_back(mesh_nodes_[i], owners[i] >= 0);
-  std::sort(present.begin(), present.end(), [](auto a, auto b) { return std::pair(a.second, a.first) < std::pair(b.second, b.first); });
+  std::sort(present.begin(), present.end(),
+            [](auto a, auto b) { return std::pair(a.second, a.first) < std::pair(b.second, b.first); });
   owned_ = static_cast<PetscInt>(std::count_if(present.begin(), present.end(), [](auto p) { return !p.second; }));
   std::vector<Index> local_of_mesh(nodes, -1);
   for (std::size_t i = 0; i < present.size(); ++i) {
@@ -50,14 +51,16 @@ Layout<d>::Layout(MPI_Comm comm, std::shared_ptr<const Mesh<d>> mesh) : mesh_(st
   for (std::size_t c = 0; c < mesh_cells_.size(); ++c) {
     local_of_cell_[static_cast<std::size_t>(mesh_cells_[c])] = static_cast<Index>(c);
     for (int i = 0; i <= d; ++i)
-      cells_(static_cast<Eigen::Index>(c), i) = local_of_mesh[static_cast<std::size_t>(mesh_->cells(mesh_cells_[c], i))];
+      cells_(static_cast<Eigen::Index>(c), i) =
+          local_of_mesh[static_cast<std::size_t>(mesh_->cells(mesh_cells_[c], i))];
   }
 
   // PETSc's numbering: contiguous by rank, in the order of the owned nodes. The mesh is replicated, so is this map.
   PetscInt first = 0;
   MPI_Exscan(&owned_, &first, 1, MPIU_INT, MPI_SUM, comm_);
   std::vector<PetscInt> mine(nodes, 0);
-  for (PetscInt i = 0; i < owned_; ++i) mine[static_cast<std::size_t>(mesh_nodes_[static_cast<std::size_t>(i)])] = first + i;
+  for (PetscInt i = 0; i < owned_; ++i)
+    mine[static_cast<std::size_t>(mesh_nodes_[static_cast<std::size_t>(i)])] = first + i;
   global_of_mesh_.resize(nodes);
   MPI_Allreduce(mine.data(), global_of_mesh_.data(), static_cast<int>(nodes), MPIU_INT, MPI_SUM, comm_);
   for (const Index node : mesh_nodes_) global_nodes_.push_back(global_of(node));
@@ -110,7 +113,8 @@ void Layout<d>::partition(std::vector<Index>& cells, std::vector<PetscInt>& owne
   SectionHandle after;
   PetscInt* moved = nullptr;
   WARMSLIP_PETSC(PetscSectionCreate(comm_, after.out()));
-  WARMSLIP_PETSC(DMPlexDistributeData(serial, migration, before, MPIU_INT, numbers.data(), after, reinterpret_cast<void**>(&moved)));
+  WARMSLIP_PETSC(DMPlexDistributeData(serial, migration, before, MPIU_INT, numbers.data(), after,
+                                      reinterpret_cast<void**>(&moved)));
   const auto number = [&](PetscInt point) {
     PetscInt offset;
     WARMSLIP_PETSC(PetscSectionGetOffset(after, point, &offset));
@@ -129,7 +133,8 @@ void Layout<d>::partition(std::vector<Index>& cells, std::vector<PetscInt>& owne
   WARMSLIP_PETSC(PetscSFGetGraph(shared, nullptr, &leaves, &local, &remote));
   for (PetscInt leaf = 0; leaf < leaves; ++leaf) {
     const PetscInt point = local ? local[leaf] : leaf;
-    if (point >= begin && point < end) owners[static_cast<std::size_t>(point - begin)] = static_cast<PetscInt>(remote[leaf].rank);
+    if (point >= begin && point < end)
+      owners[static_cast<std::size_t>(point - begin)] = static_cast<PetscInt>(remote[leaf].rank);
   }
   WARMSLIP_PETSC(PetscFree(moved));
 }
@@ -176,7 +181,8 @@ template <int d>
 VecHandle Layout<d>::vector(int block) const {
   VecHandle v;
   const auto ghosts = static_cast<PetscInt>(global_nodes_.size()) - owned_;
-  WARMSLIP_PETSC(VecCreateGhostBlock(comm_, block, owned_ * block, PETSC_DETERMINE, ghosts, global_nodes_.data() + owned_, v.out()));
+  WARMSLIP_PETSC(VecCreateGhostBlock(comm_, block, owned_ * block, PETSC_DETERMINE, ghosts,
+                                     global_nodes_.data() + owned_, v.out()));
   WARMSLIP_PETSC(VecSet(v, 0));
   return v;
 }
@@ -196,14 +202,16 @@ MatHandle Layout<d>::matrix(int rows, int cols) const {
     }
   WARMSLIP_PETSC(MatSeqAIJSetPreallocation(a, 0, near.data()));
   WARMSLIP_PETSC(MatMPIAIJSetPreallocation(a, 0, near.data(), 0, far.data()));
-  WARMSLIP_PETSC(MatSetOption(a, MAT_USE_INODES, PETSC_FALSE));  // for rows this short the plain product is twice as fast
+  WARMSLIP_PETSC(
+      MatSetOption(a, MAT_USE_INODES, PETSC_FALSE));  // for rows this short the plain product is twice as fast
   return a;
 }
 
 template <int d>
 void Layout<d>::add(Mat a, Eigen::Index cell, const double* block) const {
   std::array<PetscInt, d + 1> nodes;
-  for (int i = 0; i <= d; ++i) nodes[static_cast<std::size_t>(i)] = global_nodes_[static_cast<std::size_t>(cells_(cell, i))];
+  for (int i = 0; i <= d; ++i)
+    nodes[static_cast<std::size_t>(i)] = global_nodes_[static_cast<std::size_t>(cells_(cell, i))];
   WARMSLIP_PETSC(MatSetValuesBlocked(a, d + 1, nodes.data(), d + 1, nodes.data(), block, ADD_VALUES));
 }
 
@@ -243,7 +251,8 @@ void Layout<d>::distribute(const Eigen::VectorXd& values, Vec v) const {
   WARMSLIP_PETSC(VecGetBlockSize(v, &block));
   if (values.size() != mesh_->nodes.rows() * block)
     throw std::invalid_argument("expected " + std::to_string(block) + " values for each of the " +
-                                std::to_string(mesh_->nodes.rows()) + " nodes, got " + std::to_string(values.size()) + " in all");
+                                std::to_string(mesh_->nodes.rows()) + " nodes, got " + std::to_string(values.size()) +
+                                " in all");
   Values own(v);
   for (PetscInt i = 0; i < owned_; ++i)
     (*own).segment(i * block, block) = values.segment(mesh_nodes_[static_cast<std::size_t>(i)] * block, block);

@@ -27,7 +27,7 @@ double relative(double residual, std::initializer_list<double> terms) {
   return largest > 0 ? std::abs(residual) / largest : 0;
 }
 
-// Sums of nodal forces, and of their moments about the origin: columns of `terms`, then the scale.
+// Sums of nodal forces and of their moments, and of their sizes.
 template <int d>
 struct Resultant {
   static constexpr int moments = d == 2 ? 1 : 3;
@@ -36,8 +36,10 @@ struct Resultant {
   void add(const Point<d>& x, const Point<d>& f) {
     Eigen::Matrix<double, d + moments, 1> term;
     term.template head<d>() = f;
-    if constexpr (d == 2) term[2] = x[0] * f[1] - x[1] * f[0];
-    else term.template tail<3>() = x.cross(f);
+    if constexpr (d == 2)
+      term[2] = x[0] * f[1] - x[1] * f[0];
+    else
+      term.template tail<3>() = x.cross(f);
     sum += term;
     size += term.cwiseAbs();
   }
@@ -46,9 +48,18 @@ struct Resultant {
 }  // namespace
 
 template <int d>
-Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, const ContactSurface<d>& surface)
-    : layout_(layout), problem_(problem), operators_(operators), surface_(surface), viscous_w_(layout.vector(d)),
-      conducted_(layout.vector(1)), exchanged_(layout.vector(1)), contact_force_(layout.vector(d)), unknowns_(surface.unknowns(d)) {
+Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                          const ContactSurface<d>& surface)
+    : layout_(layout),
+      problem_(problem),
+      operators_(operators),
+      surface_(surface),
+      viscous_w_(layout.vector(d)),
+      conducted_(layout.vector(1)),
+      exchanged_(layout.vector(1)),
+      contact_force_(layout.vector(d)),
+      unknowns_(surface.unknowns(d)) {
+  centroid_ = layout.mesh().nodes.colwise().mean().transpose();
   const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   for (PetscInt& i : unknowns_) i -= first * d;
   clamped_.resize(static_cast<std::size_t>(layout.owned()));
@@ -74,7 +85,7 @@ template <int d>
 void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const Eigen::VectorXd w_points = surface_.at_points(surface_.nodal_values(after.w));
   const auto& law = problem_.law;
-  ContactProblem<d> problem{law, in.k, {}, in.contact_free};
+  ContactProblem<d> problem{law, in.k, {}, in.contact_free, in.contact_scale};
   double stored_before = 0;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
@@ -84,7 +95,8 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
     l.contact += weight * law.compliance.energy(r1);
     stored_before += weight * law.compliance.energy(r_old);
     l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
-    l.contact_damping += weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
+    l.contact_damping +=
+        weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
     l.friction += in.k * weight * law.bound(r1) * (w - w.dot(nu) * nu).norm();
     problem.points.push_back({nu, weight, r0, u0, after.gap[i]});
   }
@@ -96,7 +108,8 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
 template <int d>
 void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const double rho = problem_.material.density;
-  const double kinetic_before = 0.5 * rho * dot(before.w, before.mass_w), elastic_before = 0.5 * dot(before.u, before.elastic_u);
+  const double kinetic_before = 0.5 * rho * dot(before.w, before.mass_w),
+               elastic_before = 0.5 * dot(before.u, before.elastic_u);
   l.kinetic = 0.5 * rho * dot(after.w, after.mass_w);
   l.elastic = 0.5 * dot(after.u, after.elastic_u);
   l.kinetic_change = l.kinetic - kinetic_before;
@@ -106,16 +119,18 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   l.viscous = in.k * dot(after.w, viscous_w_);
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
-  l.energy_residual = relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
-                                   l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work,
-                               {l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, l.contact - l.contact_change,
-                                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work});
+  l.energy_residual =
+      relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
+                   l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work,
+               {l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, l.contact - l.contact_change,
+                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work});
 }
 
 // The heat balance tested with k theta_n; returns its relative residual.
 template <int d>
 double Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
-  const double stored_before = 0.5 * dot(before.theta, before.mass_theta), stored = 0.5 * dot(after.theta, after.mass_theta);
+  const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
+               stored = 0.5 * dot(after.theta, after.mass_theta);
   l.heat_change = stored - stored_before;
   l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
   l.conducted = in.k * dot(after.theta, conducted_);
@@ -128,22 +143,25 @@ double Bookkeeper<d>::heat(const Level& before, const Level& after, const StepIn
 
 // Heat content (eta = 1), force and moment (v rigid): the supports' reactions are the residuals of the fixed rows.
 template <int d>
-void Bookkeeper<d>::resultants(const Level& before, const Level& after, const StepInputs& in, double heat_energy, Ledger& l) {
+void Bookkeeper<d>::resultants(const Level& before, const Level& after, const StepInputs& in, double heat_energy,
+                               Ledger& l) {
   const double rho = problem_.material.density, k = in.k;
   {
     const Eigen::VectorXd nodal = surface_.to_nodes(in.contact_force);
     Values out(contact_force_);
     for (std::size_t i = 0; i < unknowns_.size(); ++i)
-      if (unknowns_[i] >= 0 && unknowns_[i] < layout_.owned() * d) (*out)[unknowns_[i]] = nodal[static_cast<Eigen::Index>(i)];
+      if (unknowns_[i] >= 0 && unknowns_[i] < layout_.owned() * d)
+        (*out)[unknowns_[i]] = nodal[static_cast<Eigen::Index>(i)];
   }
   Resultant<d> force;
   double content = 0, content_size = 0;
   {
-    Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta), c(contact_force_);
+    Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta),
+        c(contact_force_);
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_);
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const auto node = static_cast<std::size_t>(i);
-      const Point<d> position = layout_.mesh().nodes.row(layout_.mesh_nodes()[node]).transpose();
+      const Point<d> position = layout_.mesh().nodes.row(layout_.mesh_nodes()[node]).transpose() - centroid_;
       const auto at = [&](Values& v) -> Point<d> { return (*v).template segment<d>(i * d); };
       const Point<d> inertia = rho / k * (at(m1) - at(m0)), load = at(f), contact_here = at(c);
       force.add(position, inertia);
@@ -160,9 +178,11 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
       }
     }
   }
-  const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)), sizes = layout_.sum(Eigen::VectorXd(force.size));
+  const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
+                        sizes = layout_.sum(Eigen::VectorXd(force.size));
+  const double force_size = sizes.head(d).maxCoeff(), moment_size = sizes.tail(sizes.size() - d).maxCoeff();
   for (Eigen::Index i = 0; i < sums.size(); ++i)
-    l.force_residual = std::max(l.force_residual, relative(sums[i], {sizes.maxCoeff()}));
+    l.force_residual = std::max(l.force_residual, relative(sums[i], {i < d ? force_size : moment_size}));
   l.heat_residual = std::max(heat_energy, relative(layout_.sum(content), {layout_.sum(content_size)}));
 }
 

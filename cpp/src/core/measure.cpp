@@ -22,7 +22,8 @@ LoadQuadrature<d>::LoadQuadrature(const Layout<d>& layout, const std::optional<s
       for (int i = 0; i < d; ++i)
         for (int j = 0; j <= d; ++j) {  // the local number of the facet's node, through its cell
           const Index local = layout.local_cells()(cell, j);
-          if (layout.mesh_nodes()[static_cast<std::size_t>(local)] == facets.nodes(mine[f], i)) nodes_(static_cast<Eigen::Index>(f), i) = local;
+          if (layout.mesh_nodes()[static_cast<std::size_t>(local)] == facets.nodes(mine[f], i))
+            nodes_(static_cast<Eigen::Index>(f), i) = local;
         }
     }
   } else {
@@ -38,7 +39,8 @@ LoadQuadrature<d>::LoadQuadrature(const Layout<d>& layout, const std::optional<s
   for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
     for (Eigen::Index q = 0; q < per; ++q)
       for (Eigen::Index i = 0; i < nodes_.cols(); ++i)
-        positions_.row(s * per + q) += rule_.barycentric(q, i) * mesh.nodes.row(layout.mesh_nodes()[static_cast<std::size_t>(nodes_(s, i))]);
+        positions_.row(s * per + q) +=
+            rule_.barycentric(q, i) * mesh.nodes.row(layout.mesh_nodes()[static_cast<std::size_t>(nodes_(s, i))]);
 }
 
 template <int d>
@@ -66,7 +68,18 @@ VecHandle LoadQuadrature<d>::load(const RealTable<Eigen::Dynamic>& values) const
 }
 
 template <int d>
+void LoadQuadrature<d>::expect(const RealTable<Eigen::Dynamic>& values, Vec field, Eigen::Index components) const {
+  PetscInt block;
+  WARMSLIP_PETSC(VecGetBlockSize(field, &block));
+  if (values.rows() != positions_.rows() || block != components)
+    throw std::invalid_argument("expected one row for each of the " + std::to_string(positions_.rows()) +
+                                " quadrature points and a field of " + std::to_string(components) +
+                                " components, got " + std::to_string(values.rows()) + " and " + std::to_string(block));
+}
+
+template <int d>
 double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
+  expect(values, field, values.cols());
   const Eigen::VectorXd local = layout_.local(field);
   const auto block = static_cast<int>(values.cols());
   const Eigen::Index per = rule_.weights.size();
@@ -74,7 +87,8 @@ double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dyn
   for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
     for (Eigen::Index q = 0; q < per; ++q) {
       Eigen::VectorXd difference = -values.row(s * per + q).transpose();
-      for (Eigen::Index i = 0; i < nodes_.cols(); ++i) difference += rule_.barycentric(q, i) * local.segment(nodes_(s, i) * block, block);
+      for (Eigen::Index i = 0; i < nodes_.cols(); ++i)
+        difference += rule_.barycentric(q, i) * local.segment(nodes_(s, i) * block, block);
       total += measures_[s] * rule_.weights[q] * difference.squaredNorm();
     }
   return layout_.sum(total);
@@ -82,6 +96,10 @@ double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dyn
 
 template <int d>
 double LoadQuadrature<d>::squared_strain_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
+  expect(values, field, d);
+  if (values.cols() != d * d)
+    throw std::invalid_argument("gradients need " + std::to_string(d * d) + " columns, got " +
+                                std::to_string(values.cols()));
   const Eigen::VectorXd local = layout_.local(field);
   const Eigen::Index per = rule_.weights.size();
   double total = 0;
@@ -89,7 +107,8 @@ double LoadQuadrature<d>::squared_strain_distance(Vec field, const RealTable<Eig
     const Eigen::Index cell = cells_[static_cast<std::size_t>(s)];
     const Simplex<d> shape = simplex<d>(vertices(layout_.mesh(), layout_.mesh_cells()[static_cast<std::size_t>(cell)]));
     Eigen::Matrix<double, d*(d + 1), 1> nodal;
-    for (int i = 0; i <= d; ++i) nodal.template segment<d>(i * d) = local.segment<d>(layout_.local_cells()(cell, i) * d);
+    for (int i = 0; i <= d; ++i)
+      nodal.template segment<d>(i * d) = local.segment<d>(layout_.local_cells()(cell, i) * d);
     const Mandel<d> strain = strain_matrix<d>(shape) * nodal;
     for (Eigen::Index q = 0; q < per; ++q) {
       Tensor2<d> gradient;
@@ -123,13 +142,18 @@ template <int d>
 double Norms<d>::l2(Vec v) const {
   PetscInt block;
   WARMSLIP_PETSC(VecGetBlockSize(v, &block));
-  if (block != 1 && block != d) throw std::invalid_argument("an L2 norm is for scalars and for vectors of the space's dimension");
+  if (block != 1 && block != d)
+    throw std::invalid_argument("an L2 norm is for scalars and for vectors of the space's dimension");
   const Eigen::VectorXd local = layout_.local(v);
   return std::sqrt(layout_.sum(block == 1 ? squared_l2<1>(local) : squared_l2<d>(local)));
 }
 
 template <int d>
 double Norms<d>::v(Vec v) const {
+  PetscInt block;
+  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  if (block != d)
+    throw std::invalid_argument("|.|_V is a norm of displacements, with " + std::to_string(d) + " components a node");
   const Eigen::VectorXd local = layout_.local(v);
   double total = 0;
   for (Eigen::Index c = 0; c < layout_.cells(); ++c) {
@@ -142,8 +166,8 @@ double Norms<d>::v(Vec v) const {
   return std::sqrt(layout_.sum(total));
 }
 
-#define WARMSLIP_INSTANTIATE(d)                          \
-  template class LoadQuadrature<d>;                      \
+#define WARMSLIP_INSTANTIATE(d)     \
+  template class LoadQuadrature<d>; \
   template class Norms<d>;
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

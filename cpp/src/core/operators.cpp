@@ -101,11 +101,13 @@ MatHandle heat_matrix(const Operators<d>& operators, double k) {
 }
 
 template <int d>
-MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k, double scale) {
+MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k,
+                         double scale) {
   const Material<d>& m = problem.material;
   constexpr int b = d + 1;
   MatHandle a = assemble(layout, b, b, [&](const Simplex<d>& s) {
-    const VectorBlock<d> momentum = (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
+    const VectorBlock<d> momentum =
+        (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
     const MixedBlock<d> expansion = coupling<d>(s, m.expansion), heating = coupling<d>(s, m.heating);
     const ScalarBlock<d> heat = mass<d + 1>(s.volume) / k + conduction<d>(s, m.conductivity);
     Eigen::Matrix<double, b*(d + 1), b*(d + 1)> block;
@@ -134,10 +136,10 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   return a;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                                        \
-  template struct Operators<d>;                                                                                        \
-  template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double);             \
-  template MatHandle heat_matrix<d>(const Operators<d>&, double);                                                      \
+#define WARMSLIP_INSTANTIATE(d)                                                                            \
+  template struct Operators<d>;                                                                            \
+  template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double); \
+  template MatHandle heat_matrix<d>(const Operators<d>&, double);                                          \
   template MatHandle coupled_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double, double);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

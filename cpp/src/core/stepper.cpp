@@ -40,9 +40,14 @@ std::pair<double, Symmetry> coupled_symmetry(const Material<d>& m) {
 template <int d>
 Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                     const ContactSurface<d>& surface, StepperOptions options)
-    : layout_(layout), problem_(problem), operators_(operators), surface_(surface), options_(options),
+    : layout_(layout),
+      problem_(problem),
+      operators_(operators),
+      surface_(surface),
+      options_(options),
       books_(layout, problem, operators, surface) {
-  if (!(options.k > 0) || !std::isfinite(options.k)) throw std::invalid_argument("the time step must be positive and finite");
+  if (!(options.k > 0) || !std::isfinite(options.k))
+    throw std::invalid_argument("the time step must be positive and finite");
   const Timed timed(cost_.setup_seconds);
   if (options.coupling == Coupling::monolithic) {
     auto [scale, symmetry] = coupled_symmetry(problem.material);
@@ -119,7 +124,7 @@ template <int d>
 bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
                                ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
-  ContactProblem<d> problem{problem_.law, options_.k, {}, free};
+  ContactProblem<d> problem{problem_.law, options_.k, {}, free, contact_->scale(free)};
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), u = now_.contact_u.segment<d>(i * d);
     problem.points.push_back({nu, surface_.weights()[i], u.dot(nu) - loads.gap[i], u, loads.gap[i]});
@@ -173,7 +178,8 @@ StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>
   }
   products(next_);
   const Vec expansion_theta = monolithic ? next_.expansion_theta : now_.expansion_theta;
-  return {options_.k, loads.force, loads.heat, expansion_theta, heating_w, contact.force, free_};
+  return {options_.k, loads.force,   loads.heat, expansion_theta,
+          heating_w,  contact.force, free_,      contact_->scale(free_)};
 }
 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
@@ -186,7 +192,8 @@ bool Stepper<d>::refine(const StepLoads& loads, const StepInputs& inputs, Contac
     books_.heat_defect(now_, next_, inputs, heat_right_);
     join(momentum_right_, heat_right_, coupled_right_);
   }
-  const Eigen::VectorXd correction = surface_.at_points(momentum_->reduce(monolithic ? coupled_right_ : momentum_right_));
+  const Eigen::VectorXd correction =
+      surface_.at_points(momentum_->reduce(monolithic ? coupled_right_ : momentum_right_));
   const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
   const Eigen::VectorXd before = contact.force;
   free_ = velocity + contact_->compliance() * before + correction;
@@ -203,6 +210,18 @@ bool Stepper<d>::refine(const StepLoads& loads, const StepInputs& inputs, Contac
   contact = std::move(again);
   ++cost_.refinements;
   return true;
+}
+
+// Only a step that closes its books becomes the state.
+template <int d>
+Outcome Stepper<d>::judge(const Ledger& l) const {
+  const double bound = options_.identity_bound, floor = l.law_floor;
+  if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.conducted + l.heat_change)) return Outcome::not_finite;
+  if (!(floor <= options_.floor_bound)) return Outcome::precision_lost;
+  // the contact terms of the energy are evaluated by the law, with its rounding
+  const bool closed = l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound + floor &&
+                      l.law_residual <= bound + floor;
+  return closed ? Outcome::right : Outcome::identity_violated;
 }
 
 template <int d>
@@ -241,15 +260,12 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   }
   const StepInputs inputs = complete(loads, contact);
   report.ledger = books_.close(now_, next_, inputs);
-  if (std::max({report.ledger.energy_residual, report.ledger.force_residual, monolithic ? report.ledger.heat_residual : 0.0}) >
-          options_.refinement &&
+  if (std::max({report.ledger.energy_residual, report.ledger.force_residual,
+                monolithic ? report.ledger.heat_residual : 0.0}) > options_.refinement &&
       refine(loads, inputs, contact))
     report.ledger = books_.close(now_, next_, complete(loads, contact));
-  const Ledger& l = report.ledger;
-  if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.conducted + l.heat_change)) {
-    report.outcome = Outcome::not_finite;
-    return report;
-  }
+  report.outcome = judge(report.ledger);
+  if (report.outcome != Outcome::right) return report;
 
   report.stage = contact.stage;
   report.newton_iterations = contact.iterations;

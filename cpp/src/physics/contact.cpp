@@ -38,12 +38,15 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
                                    : Tensor2<d>(bound / size * (tangential - direction * direction.transpose()));
     out.value += tangential * force - bound * direction;
     out.by_force += tangential - turn;
-    out.by_velocity -= beta * turn + point.weight * law.friction.coefficient * pressure_tangent * k * direction * nu.transpose();
+    out.by_velocity -=
+        beta * turn + point.weight * law.friction.coefficient * pressure_tangent * k * direction * nu.transpose();
   }
   return out;
 }
 
-template PointResidual<2> residual<2>(const ContactLaw&, const ContactPoint<2>&, double, double, double, const Point<2>&, const Point<2>&);
-template PointResidual<3> residual<3>(const ContactLaw&, const ContactPoint<3>&, double, double, double, const Point<3>&, const Point<3>&);
+template PointResidual<2> residual<2>(const ContactLaw&, const ContactPoint<2>&, double, double, double,
+                                      const Point<2>&, const Point<2>&);
+template PointResidual<3> residual<3>(const ContactLaw&, const ContactPoint<3>&, double, double, double,
+                                      const Point<3>&, const Point<3>&);
 
 }  // namespace warmslip

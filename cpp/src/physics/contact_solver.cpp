@@ -7,7 +7,8 @@
 namespace warmslip {
 
 template <int d>
-double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity, double* floor) {
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
+                    double* floor) {
   constexpr double eps = std::numeric_limits<double>::epsilon();
   const double mu = problem.law.friction.coefficient;
   double largest = 0, fastest = 0, rounding = 0;
@@ -15,14 +16,19 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const auto& point = problem.points[i];
     const auto at = static_cast<Eigen::Index>(i) * d;
     const double r = point.penetration + problem.step * velocity.template segment<d>(at).dot(point.normal);
-    largest = std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
+    largest =
+        std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
     fastest = std::max({fastest, problem.free.template segment<d>(at).norm(), velocity.template segment<d>(at).norm()});
-    const double terms = point.displacement.norm() + std::abs(point.gap) + problem.step * velocity.template segment<d>(at).norm();
+    const double terms =
+        point.displacement.norm() + std::abs(point.gap) + problem.step * velocity.template segment<d>(at).norm();
     rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
   }
-  *floor = 0;
+  *floor = std::numeric_limits<double>::infinity();
   if (!std::isfinite(largest) || !std::isfinite(fastest)) return std::numeric_limits<double>::infinity();
-  if (largest <= rounding) return 0;  // no contact force that rounding would let one tell from none
+  if (largest <= rounding) {  // no contact force that rounding would let one tell from none: is that small?
+    *floor = rounding > 0 ? rounding / problem.scale : 0;
+    return 0;
+  }
   *floor = rounding / largest;
   const double bound_scale = mu > 0 ? mu * largest : largest;
   double worst = 0;
@@ -33,9 +39,10 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double r = point.penetration + problem.step * w.dot(point.normal);
     const Point<d> f_tau = f - f.dot(point.normal) * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
     const double bound = point.weight * problem.law.bound(r);
-    worst = std::max({worst, std::abs(f.dot(point.normal) - point.weight * problem.law.compliance.pressure(r)) / largest,
-                      (f_tau.norm() - bound) / bound_scale,
-                      fastest > 0 ? (bound * w_tau.norm() - f_tau.dot(w_tau)) / (bound_scale * fastest) : 0.0});
+    worst =
+        std::max({worst, std::abs(f.dot(point.normal) - point.weight * problem.law.compliance.pressure(r)) / largest,
+                  (f_tau.norm() - bound) / bound_scale,
+                  fastest > 0 ? (bound * w_tau.norm() - f_tau.dot(w_tau)) / (bound_scale * fastest) : 0.0});
   }
   return worst;
 }
@@ -57,7 +64,8 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
 }
 
 template <int d>
-typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& force) const {
+typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
+                                                                     const Eigen::VectorXd& force) const {
   Linearisation at;
   at.velocity = problem.free;
   at.velocity.noalias() -= compliance_ * force;
@@ -70,10 +78,11 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
     const double normal = nu.dot(own * nu);
     // rows in units of force, of order one in the force whatever the stiffness
     const double alpha = 1 / (1 + problem.points[i].weight * stiffness * problem.step * normal);
-    // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more often
+    // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more
+    // often
     const double beta = 1 / std::max(reach_.template segment<d>(row).maxCoeff(), 1e-300);
-    at.points.push_back(residual<d>(problem.law, problem.points[i], problem.step, alpha, beta, force.template segment<d>(row),
-                                    at.velocity.template segment<d>(row)));
+    at.points.push_back(residual<d>(problem.law, problem.points[i], problem.step, alpha, beta,
+                                    force.template segment<d>(row), at.velocity.template segment<d>(row)));
     at.value.template segment<d>(row) = at.points.back().value;
     at.key.push_back(static_cast<int>(at.points.back().status) * 10 + at.points.back().slip_sign);
   }
@@ -162,7 +171,8 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     if (step % 20 == 0) {
       for (std::size_t i = 0; i < problem.points.size(); ++i)
         bounds[static_cast<Eigen::Index>(i)] =
-            problem.law.friction.coefficient * std::max(0.0, force.template segment<d>(static_cast<Eigen::Index>(i) * d).dot(problem.points[i].normal));
+            problem.law.friction.coefficient *
+            std::max(0.0, force.template segment<d>(static_cast<Eigen::Index>(i) * d).dot(problem.points[i].normal));
       momentum = force;
       inertia = 1;
     }

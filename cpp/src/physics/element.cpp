@@ -61,17 +61,18 @@ ScalarBlock<d> conduction(const Simplex<d>& s, const Tensor2<d>& k) {
 
 template <int d>
 MixedBlock<d> coupling(const Simplex<d>& s, const Tensor2<d>& t) {
-  const Eigen::Matrix<double, d*(d + 1), 1> strain_work = s.volume / (d + 1) * (strain_matrix<d>(s).transpose() * to_mandel<d>(t));
+  const Eigen::Matrix<double, d*(d + 1), 1> strain_work =
+      s.volume / (d + 1) * (strain_matrix<d>(s).transpose() * to_mandel<d>(t));
   return strain_work.replicate(1, d + 1);
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                      \
-  template Vertices<d> vertices<d>(const Mesh<d>&, Eigen::Index);                    \
-  template Simplex<d> simplex<d>(const Vertices<d>&);                                \
-  template StrainMatrix<d> strain_matrix<d>(const Simplex<d>&);                      \
-  template VectorBlock<d> vector_mass<d>(const Simplex<d>&);                         \
-  template VectorBlock<d> strain_energy<d>(const Simplex<d>&, const Tensor4<d>&);    \
-  template ScalarBlock<d> conduction<d>(const Simplex<d>&, const Tensor2<d>&);       \
+#define WARMSLIP_INSTANTIATE(d)                                                   \
+  template Vertices<d> vertices<d>(const Mesh<d>&, Eigen::Index);                 \
+  template Simplex<d> simplex<d>(const Vertices<d>&);                             \
+  template StrainMatrix<d> strain_matrix<d>(const Simplex<d>&);                   \
+  template VectorBlock<d> vector_mass<d>(const Simplex<d>&);                      \
+  template VectorBlock<d> strain_energy<d>(const Simplex<d>&, const Tensor4<d>&); \
+  template ScalarBlock<d> conduction<d>(const Simplex<d>&, const Tensor2<d>&);    \
   template MixedBlock<d> coupling<d>(const Simplex<d>&, const Tensor2<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -52,7 +52,8 @@ std::vector<std::array<int, d + 1>> kuhn_simplices() {
   do {
     std::array<int, d + 1> corners{};
     for (int i = 0; i < d; ++i)
-      corners[static_cast<std::size_t>(i + 1)] = corners[static_cast<std::size_t>(i)] | (1 << order[static_cast<std::size_t>(i)]);
+      corners[static_cast<std::size_t>(i + 1)] =
+          corners[static_cast<std::size_t>(i)] | (1 << order[static_cast<std::size_t>(i)]);
     int inversions = 0;
     for (int i = 0; i < d; ++i)
       for (int j = i + 1; j < d; ++j)
@@ -71,7 +72,8 @@ void check_nodes(const RealTable<d>& nodes) {
   std::vector<Eigen::Index> order(static_cast<std::size_t>(nodes.rows()));
   std::iota(order.begin(), order.end(), 0);
   const auto row_less = [&](Eigen::Index a, Eigen::Index b) {
-    return std::lexicographical_compare(nodes.row(a).begin(), nodes.row(a).end(), nodes.row(b).begin(), nodes.row(b).end());
+    return std::lexicographical_compare(nodes.row(a).begin(), nodes.row(a).end(), nodes.row(b).begin(),
+                                        nodes.row(b).end());
   };
   std::sort(order.begin(), order.end(), row_less);
   for (std::size_t i = 1; i < order.size(); ++i)
@@ -96,11 +98,11 @@ void check_cells(const Mesh<d>& mesh) {
     const double size = (x.rowwise() - x.row(0)).rowwise().norm().maxCoeff();
     const double volume = simplex<d>(x).volume;
     if (!(volume > 1e-14 * std::pow(size, d)))
-      refuse("cell " + std::to_string(c) + (volume < 0 ? " is inverted; swap two of its nodes" : " is flat; remove it"));
+      refuse("cell " + std::to_string(c) +
+             (volume < 0 ? " is inverted; swap two of its nodes" : " is flat; remove it"));
   }
   const auto orphan = std::find(used.begin(), used.end(), false);
-  if (orphan != used.end())
-    refuse("node " + std::to_string(orphan - used.begin()) + " belongs to no cell; remove it");
+  if (orphan != used.end()) refuse("node " + std::to_string(orphan - used.begin()) + " belongs to no cell; remove it");
 }
 
 }  // namespace
@@ -233,7 +235,8 @@ Mesh<d> box(const std::array<int, d>& counts, const std::array<double, d>& lengt
 }
 
 template <int d>
-Mesh<d> mesh_from_lists(RealTable<d> nodes, IndexTable<d + 1> cells, const std::map<std::string, IndexTable<d>>& parts) {
+Mesh<d> mesh_from_lists(RealTable<d> nodes, IndexTable<d + 1> cells,
+                        const std::map<std::string, IndexTable<d>>& parts) {
   if (cells.rows() == 0) refuse("the mesh has no cells");
   check_nodes<d>(nodes);
   Mesh<d> mesh{std::move(nodes), std::move(cells), {}};
@@ -255,11 +258,11 @@ Mesh<d> mesh_from_lists(RealTable<d> nodes, IndexTable<d + 1> cells, const std::
   return mesh;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                             \
-  template struct Mesh<d>;                                                                                  \
-  template Facets<d> boundary<d>(const IndexTable<d + 1>&);                                                 \
-  template Point<d> area_normal<d>(const Mesh<d>&, const Facets<d>&, Eigen::Index);                         \
-  template Mesh<d> box<d>(const std::array<int, d>&, const std::array<double, d>&, Diagonal);               \
+#define WARMSLIP_INSTANTIATE(d)                                                               \
+  template struct Mesh<d>;                                                                    \
+  template Facets<d> boundary<d>(const IndexTable<d + 1>&);                                   \
+  template Point<d> area_normal<d>(const Mesh<d>&, const Facets<d>&, Eigen::Index);           \
+  template Mesh<d> box<d>(const std::array<int, d>&, const std::array<double, d>&, Diagonal); \
   template Mesh<d> mesh_from_lists<d>(RealTable<d>, IndexTable<d + 1>, const std::map<std::string, IndexTable<d>>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -13,7 +13,8 @@ namespace warmslip {
 namespace {
 
 // t += A x for `rows` x `width` A by columns, four columns a pass
-inline __attribute__((always_inline)) void multiply(const double* __restrict a, int rows, int width, const double* __restrict x, double* __restrict t) {
+inline __attribute__((always_inline)) void multiply(const double* __restrict a, int rows, int width,
+                                                    const double* __restrict x, double* __restrict t) {
   int j = 0;
   for (; j + 4 <= width; j += 4, a += 4 * static_cast<std::size_t>(rows)) {
     const double *a0 = a, *a1 = a0 + rows, *a2 = a1 + rows, *a3 = a2 + rows;
@@ -45,7 +46,8 @@ inline __attribute__((always_inline)) double dot(const double* __restrict a, con
 
 }  // namespace
 
-Panels::Panels(std::size_t n, const int* start, const int* count, const int* index, const double* value) : inverse_pivots_(n) {
+Panels::Panels(std::size_t n, const int* start, const int* count, const int* index, const double* value)
+    : inverse_pivots_(n) {
   int longest = 0;
   for (std::size_t first = 0; first < n;) {
     std::size_t end = first + 1;

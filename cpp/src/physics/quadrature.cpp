@@ -24,7 +24,8 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> gauss_jacobi(int n, int a) {
 }  // namespace
 
 Rule simplex_rule(int dim, int n) {
-  if (dim < 1 || dim > 3 || n < 1) throw std::invalid_argument("a simplex rule needs dimension 1 to 3 and n >= 1 points");
+  if (dim < 1 || dim > 3 || n < 1)
+    throw std::invalid_argument("a simplex rule needs dimension 1 to 3 and n >= 1 points");
   int total = 1;
   for (int a = 0; a < dim; ++a) total *= n;
   Rule rule{RealTable<Eigen::Dynamic>(total, dim + 1), Eigen::VectorXd::Ones(total)};

@@ -1,3 +1,6 @@
+#include <stdexcept>
+#include <string>
+
 #include "warmslip/element.hpp"
 #include "warmslip/problem.hpp"
 
@@ -6,6 +9,9 @@ namespace warmslip {
 template <int d>
 RealTable<d * d> stress(const Mesh<d>& mesh, const Material<d>& material, const RealTable<d>& u, const RealTable<d>& w,
                         const Eigen::VectorXd& theta) {
+  if (u.rows() != mesh.nodes.rows() || w.rows() != mesh.nodes.rows() || theta.size() != mesh.nodes.rows())
+    throw std::invalid_argument("u, w and theta need one row for each of the " + std::to_string(mesh.nodes.rows()) +
+                                " nodes");
   RealTable<d * d> sigma(mesh.cells.rows(), d * d);
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
     const StrainMatrix<d> b = strain_matrix<d>(simplex<d>(vertices(mesh, c)));
@@ -25,7 +31,9 @@ RealTable<d * d> stress(const Mesh<d>& mesh, const Material<d>& material, const 
   return sigma;
 }
 
-template RealTable<4> stress<2>(const Mesh<2>&, const Material<2>&, const RealTable<2>&, const RealTable<2>&, const Eigen::VectorXd&);
-template RealTable<9> stress<3>(const Mesh<3>&, const Material<3>&, const RealTable<3>&, const RealTable<3>&, const Eigen::VectorXd&);
+template RealTable<4> stress<2>(const Mesh<2>&, const Material<2>&, const RealTable<2>&, const RealTable<2>&,
+                                const Eigen::VectorXd&);
+template RealTable<9> stress<3>(const Mesh<3>&, const Material<3>&, const RealTable<3>&, const RealTable<3>&,
+                                const Eigen::VectorXd&);
 
 }  // namespace warmslip
