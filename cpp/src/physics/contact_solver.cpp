@@ -26,7 +26,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
   *floor = std::numeric_limits<double>::infinity();
   if (!std::isfinite(largest) || !std::isfinite(fastest)) return std::numeric_limits<double>::infinity();
   if (largest <= rounding) {  // no contact force that rounding would let one tell from none: is that small?
-    *floor = rounding > 0 ? rounding / problem.scale : 0;
+    *floor = problem.scale > 0 ? rounding / problem.scale : 0;  // a body at rest has nothing to be compared with
     return 0;
   }
   *floor = rounding / largest;
