@@ -212,3 +212,11 @@ def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
     assert (w[0] == [1, 0.5]).all()
     assert (u[0] == [0.1, 0.2]).all()
     assert all(report.outcome.name == "right" for report in job.steps())
+
+
+def test_a_body_at_rest_away_from_the_foundation_stays_there(small: MakeScene) -> None:
+    still = {"loads__body": [0.0, 0.0], "loads__traction": {}, "heat__source": 0.0}
+    result = warmslip.run(small(contact__gap=0.1, contact__heat_exchange__foundation_temperature=0.0, **still))
+    assert (result.outcome, result.summary["contact"]["open"]) == ("right", 5)
+    assert not result.u.any()
+    assert not result.theta.any()
