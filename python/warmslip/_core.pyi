@@ -294,7 +294,7 @@ class Operators2:
     @property
     def vector_mass(self) -> petsc4py.PETSc.Mat:
         """
-        (w, v) without the density
+        (w, v) without the density, a copy
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat:
@@ -450,7 +450,7 @@ class Operators3:
     @property
     def vector_mass(self) -> petsc4py.PETSc.Mat:
         """
-        (w, v) without the density
+        (w, v) without the density, a copy
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat:
@@ -694,10 +694,16 @@ class Outcome:
       contact_not_converged
     
       not_finite
+    
+      identity_violated
+    
+      precision_lost
     """
     __members__: typing.ClassVar[dict[str, Outcome]]
     contact_not_converged: typing.ClassVar[Outcome]
+    identity_violated: typing.ClassVar[Outcome]
     not_finite: typing.ClassVar[Outcome]
+    precision_lost: typing.ClassVar[Outcome]
     right: typing.ClassVar[Outcome]
     @typing.overload
     def __eq__(self, other: Outcome) -> bool:
@@ -898,7 +904,7 @@ class Cost:
     """
     What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
     """
-    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'refinements', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
     @property
     def contact_seconds(self) -> float:
         ...
@@ -919,6 +925,9 @@ class Cost:
         ...
     @property
     def newton_iterations(self) -> int:
+        ...
+    @property
+    def refinements(self) -> int:
         ...
     @property
     def setup_seconds(self) -> float:
