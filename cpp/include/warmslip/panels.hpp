@@ -1,9 +1,9 @@
 // Triangular substitution with a sparse L D L^T whose columns are gathered into dense panels.
 //
-// Columns of equal structure (the unknowns of one node, and of whole separators) share one list of rows, so a sweep reads
-// eight bytes an entry in unit stride instead of twelve. A step's cost is two such sweeps, and their cost is memory
-// traffic: the factors of h = 1/256 shrink from 160 to 115 MB and the sweeps take about a quarter less time than CHOLMOD's
-// own substitution, which is why this is not left to the library.
+// Columns of equal structure (the unknowns of one node, and of whole separators) share one list of rows, so a sweep
+// reads eight bytes an entry in unit stride instead of twelve. A step's cost is two such sweeps, and their cost is
+// memory traffic: the factors of h = 1/256 shrink from 160 to 115 MB and the sweeps take about a quarter less time than
+// CHOLMOD's own substitution, which is why this is not left to the library.
 #pragma once
 #include <cstddef>
 #include <vector>
