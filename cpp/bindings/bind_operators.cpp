@@ -41,14 +41,8 @@ void bind(py::module_& m) {
         attribute, [member](const O& o) { return share(o.*member); }, doc);
   };
   matrix("mass", &O::mass, "(theta, eta)");
-  operators.def_property_readonly(
-      "vector_mass",
-      [](const O& o) {
-        MatHandle copy;  // kept as one scalar matrix for all components, handed out as an ordinary one
-        WARMSLIP_PETSC(MatConvert(o.vector_mass, MATAIJ, MAT_INITIAL_MATRIX, copy.out()));
-        return release(std::move(copy));
-      },
-      "(w, v) without the density, a copy");
+  matrix("vector_mass", &O::vector_mass,
+         "(w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries");
   matrix("elasticity", &O::elasticity, "a(u, v)");
   matrix("viscosity", &O::viscosity, "b(w, v)");
   matrix("conductivity", &O::conductivity, "d(theta, eta)");

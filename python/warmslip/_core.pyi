@@ -294,7 +294,7 @@ class Operators2:
     @property
     def vector_mass(self) -> petsc4py.PETSc.Mat:
         """
-        (w, v) without the density, a copy
+        (w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat:
@@ -450,7 +450,7 @@ class Operators3:
     @property
     def vector_mass(self) -> petsc4py.PETSc.Mat:
         """
-        (w, v) without the density, a copy
+        (w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat:

@@ -9,7 +9,8 @@ import numpy as np
 
 from warmslip import _core
 from warmslip.loads import Array, Loads, LoadVectors, evaluate
-from warmslip.scene import IsotropicTable, Scene
+from warmslip.scene import Scene
+from warmslip.tables import IsotropicTable
 
 
 def _d(name: str, dim: int) -> Any:

@@ -8,9 +8,9 @@ node a is entry 2 a + c of a vector field. With K = rho M/k + B + k A (momentum)
                                                                      monolithic  theta_* = theta_n,     w_* = w_n
 
 P turns the contact tractions s = (lam, p) of the bottom nodes into nodal forces (vertex rule). K never changes, so it
-is factored once and Y = K^-1 P is stored: a step costs one solve with K, a dense problem for s on the contact nodes
-(class Contact), the correction w_n = K^-1 right - Y s, and one solve with H. Monolithic factors the coupled matrix of
-both fields instead. Every quantity is dimensionless.
+is factored once: a step costs one solve with K, a dense problem for s on the contact nodes (class Contact), the
+correction w_n = K^-1 right - Y s with the stored Y = K^-1 P (plainer and slower: a second solve), and one solve with H.
+Monolithic factors the coupled matrix of both fields instead. Every quantity is dimensionless.
 """
 
 from dataclasses import dataclass
@@ -212,8 +212,11 @@ class Result:
     seconds_loop: float  # CPU time of the time loop
 
 
-def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_nu=1e4, k_c=1.0, rho=1.0, keep="all"):
-    """Run the scheme on n x n squares from rest, u = w = theta = 0, to time T; keep is "all" or "final"."""
+def simulate(
+    reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_nu=1e4, k_c=1.0, rho=1.0, keep="all", store=True
+):
+    """Run the scheme on n x n squares from rest, u = w = theta = 0, to time T; keep is "all" or "final". The contact
+    tractions correct the velocities through the stored K^-1 P, or by a second solve with K when store is False."""
     parameters = dict(locals())  # the arguments alone, so far
     if coupling not in COUPLINGS or keep not in ("all", "final"):
         raise ValueError(f"unknown coupling {coupling!r} or keep {keep!r}")
@@ -241,7 +244,7 @@ def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_
     node = np.arange(m)  # the contact nodes come first; their unknowns are 2 node and 2 node + 1
     P = np.zeros((solver.shape[0], 2 * m), order="F")
     P[2 * node, node], P[2 * node + 1, m + node] = edge_weights(n), -edge_weights(n)
-    Y = solver.solve(P)
+    Y, sparse_P = solver.solve(P), sp.csr_matrix(P)
 
     def local(field):  # tangential components, then normal ones, at the contact nodes
         return np.concatenate([field[0 : 2 * m : 2], -field[1 : 2 * m : 2]])
@@ -256,7 +259,9 @@ def simulate(reading, theta_F, n, steps, coupling="staggered", T=1.0, mu=0.2, c_
         fields = solver.solve(right)
         s = contact.solve(local(fields), local(u)[m:])
         closed = np.flatnonzero(s[m:])
-        if len(closed):
+        if not store:
+            fields = solver.solve(right - sparse_P @ s)
+        elif len(closed):
             for block in (0, m):  # only the columns between the first and the last closed node
                 span = slice(block + closed[0], block + closed[-1] + 1)
                 fields -= Y[:, span] @ s[span]

@@ -65,6 +65,7 @@ class ContactSolver {
   struct Linearisation;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& force) const;
   void factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution);
+  Eigen::VectorXd direction(const Linearisation& at, const Eigen::VectorXd& force) const;
   bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
@@ -72,9 +73,10 @@ class ContactSolver {
 
   Eigen::MatrixXd compliance_;
   ContactOptions options_;
-  Eigen::VectorXd reach_;      // row sums of |compliance|
-  double spectral_ = 0;        // their largest, a bound on the eigenvalues of the compliance
-  std::vector<int> factored_;  // statuses the tangent below belongs to
+  Eigen::VectorXd reach_;             // row sums of |compliance|
+  double spectral_ = 0;               // their largest, a bound on the eigenvalues of the compliance
+  std::vector<int> factored_;         // statuses the tangent below belongs to
+  std::vector<Eigen::Index> closed_;  // its rows: the components of the points in contact
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };
 

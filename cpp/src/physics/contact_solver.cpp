@@ -92,10 +92,15 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
 template <int d>
 void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
   if (d == 2 && at.key == factored_) return;  // piecewise linear laws: same statuses, same tangent
-  Eigen::MatrixXd tangent(compliance_.rows(), compliance_.cols());
-  for (std::size_t i = 0; i < at.points.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i) * d;
-    tangent.template middleRows<d>(row).noalias() = -at.points[i].by_velocity * compliance_.template middleRows<d>(row);
+  closed_.clear();
+  for (std::size_t i = 0; i < at.points.size(); ++i)
+    if (at.points[i].status != Status::open)
+      for (int c = 0; c < d; ++c) closed_.push_back(static_cast<Eigen::Index>(i) * d + c);
+  Eigen::MatrixXd tangent = compliance_(closed_, closed_);
+  for (std::size_t j = 0; j < closed_.size(); j += d) {
+    const auto row = static_cast<Eigen::Index>(j);
+    const auto i = static_cast<std::size_t>(closed_[j] / d);
+    tangent.template middleRows<d>(row) = (-at.points[i].by_velocity * tangent.template middleRows<d>(row)).eval();
     tangent.template block<d, d>(row, row) += at.points[i].by_force;
     // Gauss points outnumber nodes: sticking ones share their force arbitrarily, and this picks the nearest share.
     // The residual is untouched, so the answer is not regularised.
@@ -107,6 +112,25 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   tangent_.compute(tangent);
   factored_ = at.key;
   ++solution.factorizations;
+}
+
+// The Newton direction: an open point drops its force at once, the closed ones share a dense system.
+template <int d>
+Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at, const Eigen::VectorXd& force) const {
+  Eigen::VectorXd out = -force;
+  out(closed_).setZero();
+  Eigen::VectorXd right = -at.value(closed_);
+  if (!out.isZero(0)) {
+    const Eigen::VectorXd change = compliance_ * out;  // of minus the velocities
+    for (std::size_t j = 0; j < closed_.size(); j += d)
+      right.template segment<d>(static_cast<Eigen::Index>(j)) +=
+          at.points[static_cast<std::size_t>(closed_[j] / d)].by_velocity * change.template segment<d>(closed_[j]);
+  }
+  if (!closed_.empty()) {
+    right = tangent_.solve(right);
+    out(closed_) = right;
+  }
+  return out;
 }
 
 template <int d>
@@ -126,15 +150,15 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     // the same statuses once more, after others: an undamped iteration would cycle for ever
     if (d == 2 && !line_search && at.key != factored_ && !seen.insert(at.key).second) return false;
     factor(problem, at, solution);
-    const Eigen::VectorXd direction = -tangent_.solve(at.value);
-    if (!direction.allFinite()) return false;
+    const Eigen::VectorXd change = direction(at, solution.force);
+    if (!change.allFinite()) return false;
     ++solution.iterations;
     const double before = at.value.norm();
     double length = 1;
     for (;; length /= 2) {
-      Linearisation next = linearise(problem, solution.force + length * direction);
+      Linearisation next = linearise(problem, solution.force + length * change);
       if (!line_search || next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
-        solution.force += length * direction;
+        solution.force += length * change;
         at = std::move(next);
         break;
       }
