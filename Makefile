@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test asan bench lint
+.PHONY: help setup reproduce test asan bench mutants lint
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -22,6 +22,9 @@ asan: setup  ## the C++ tests under the address and undefined behaviour sanitize
 
 bench: setup  ## the benchmarks alone (ARGS go to pytest)
 	@$(env) python -m pytest -o addopts="--import-mode=importlib" --benchmark-only $(ARGS) tests/benchmarks
+
+mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --every, --out FILE)
+	@$(env) python tests/mutants/run.py $(ARGS)
 
 lint: setup  ## format, style, types and layers
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports

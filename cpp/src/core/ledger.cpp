@@ -153,7 +153,8 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
       if (unknowns_[i] >= 0 && unknowns_[i] < layout_.owned() * d)
         (*out)[unknowns_[i]] = nodal[static_cast<Eigen::Index>(i)];
   }
-  Resultant<d> force;
+  // Internal forces and heat flows add up to nothing, but not to less than their rounding: they belong to the sizes.
+  Resultant<d> force, internal;
   double content = 0, content_size = 0;
   {
     Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta),
@@ -167,10 +168,12 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
       force.add(position, inertia);
       force.add(position, -load);
       force.add(position, contact_here);
+      for (Values* v : {&e, &b, &g}) internal.add(position, at(*v));
       if (clamped_[node]) force.add(position, -(inertia - load + contact_here + at(b) + at(e) - at(g)));
       const double storage = ((*t1)[i] - (*t0)[i]) / k, exchange = (*x)[i], source = (*q)[i] + (*h)[i];
       content += storage + exchange - source;
-      content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
+      content_size +=
+          (std::abs((*t1)[i]) + std::abs((*t0)[i])) / k + std::abs((*flux)[i]) + std::abs(exchange) + std::abs(source);
       if (cooled_[node]) {
         const double wall = storage + exchange - source + (*flux)[i];
         content -= wall;
@@ -179,7 +182,7 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
-                        sizes = layout_.sum(Eigen::VectorXd(force.size));
+                        sizes = layout_.sum(Eigen::VectorXd(force.size + internal.size));
   const double force_size = sizes.head(d).maxCoeff(), moment_size = sizes.tail(sizes.size() - d).maxCoeff();
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], {i < d ? force_size : moment_size}));

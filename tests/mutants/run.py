@@ -1,0 +1,195 @@
+"""Seeded faults against the tests: which check kills which mutant. `make mutants` runs all of them.
+
+A mutant is an entry of faults.toml: a file, a text that stands in it exactly once, and what to put there instead. Each worker
+builds one copy of the tree, applies one mutant after another, compiles what changed and runs the fast tests until the
+first fails. The table says who killed it; a survivor is a check that is missing, or a fault that changes nothing (its
+entry then says why).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import Queue
+from typing import Any, NamedTuple
+
+from rich.progress import Progress
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+# fast and near the mathematics first; -x stops at the first that fails
+SUITE = ["tests/verification", "tests/unit", "-m", "not slow", "--deselect", "tests/unit/test_public_files.py"]
+# the tree's own package in place of the installed one, in every process the tests start
+SHADOW = """import sys
+sys.meta_path[:] = [f for f in sys.meta_path if "editable" not in type(f).__module__.lower()]
+"""
+
+
+class Fault(NamedTuple):
+    name: str
+    file: str
+    old: str
+    new: str
+    what: str
+    survives: str = ""  # why no check can fail, when none can
+
+
+class Found(NamedTuple):
+    fault: Fault
+    outcome: str  # killed, survived, invalid
+    by: str
+
+
+def faults() -> list[Fault]:
+    """All entries of faults.toml. Raises ValueError when a text does not stand in its file exactly once."""
+    out = [Fault(**entry) for entry in tomllib.loads((HERE / "faults.toml").read_text())["fault"]]
+    for fault in out:
+        count = (ROOT / fault.file).read_text().count(fault.old)
+        if count != 1:
+            raise ValueError(f"{fault.name}: its old text stands {count} times in {fault.file}; it must stand once")
+    if len({fault.name for fault in out}) < len(out):
+        raise ValueError("two faults have the same name")
+    return out
+
+
+class Tree:
+    """A copy of the tracked files with a build of its own; one that is there already is brought up to date."""
+
+    def __init__(self, at: Path) -> None:
+        self.at = at
+        tracked = subprocess.run(
+            ["git", "ls-files", "-coz", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        for name in filter(None, tracked.stdout.split("\0")):
+            source, copy = ROOT / name, at / name
+            if name.startswith("results/") or source.is_symlink():
+                continue
+            if not copy.exists() or copy.read_bytes() != source.read_bytes():
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source, copy)
+        (at / "shadow").mkdir(exist_ok=True)
+        (at / "shadow/sitecustomize.py").write_text(SHADOW)
+        pybind = self._run(sys.executable, "-m", "pybind11", "--cmakedir").stdout.strip()
+        self._run(
+            *("cmake", "-S", ".", "-B", "build/tests", "-G", "Ninja", "-DWARMSLIP_PYTHON=ON", "-DWARMSLIP_TESTS=ON"),
+            *(f"-Dpybind11_DIR={pybind}", f"-DPython_EXECUTABLE={sys.executable}"),
+            "-DCMAKE_BUILD_TYPE=Release",
+        ).check_returncode()
+
+    def _run(self, *command: str) -> subprocess.CompletedProcess[str]:
+        environment = os.environ | {"PYTHONPATH": f"{self.at / 'shadow'}:{self.at / 'python'}"}
+        return subprocess.run(command, cwd=self.at, env=environment, capture_output=True, text=True, check=False)
+
+    def build(self) -> str:
+        """Compiles; the compiler's first error, or nothing."""
+        result = self._run("cmake", "--build", "build/tests", "-j1")
+        for core in (self.at / "build/tests").glob("_core.*.so"):
+            shutil.copy2(core, self.at / "python/warmslip" / core.name)
+        error = re.search(r"error: .*", result.stdout + result.stderr)
+        return "" if result.returncode == 0 else error[0] if error else "the build failed"
+
+    def failures(self, *, every: bool) -> list[str]:
+        """The tests that fail: the first, or all of them."""
+        tests = self._run(
+            *(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE"),
+            *([] if every else ["-x"]),
+            *SUITE,
+        )
+        found = re.findall(r"^(?:FAILED|ERROR) (?:tests/)?(.+?)(?: - .*)?$", tests.stdout, re.MULTILINE)
+        if found and not every:
+            return found
+        native = self._run("build/tests/tests/cpp/test_core")
+        found += [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", native.stdout)]
+        if not found and (tests.returncode or native.returncode):
+            found.append("a crash" if tests.returncode < 0 or native.returncode < 0 else "the tests did not run")
+        return list(dict.fromkeys(found))
+
+    def judge(self, fault: Fault, *, every: bool) -> Found:
+        path = self.at / fault.file
+        original = path.read_text()
+        path.write_text(original.replace(fault.old, fault.new))
+        try:
+            error = self.build()
+            if error:
+                return Found(fault, "invalid", error)
+            failed = self.failures(every=every)
+            return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
+        finally:
+            path.write_text(original)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", help="faults to try (default: all)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="trees at work at once")
+    parser.add_argument("--every", action="store_true", help="run all tests, not only up to the first that fails")
+    parser.add_argument("--trees", type=Path, help="where to keep the built trees for the next time (default: nowhere)")
+    parser.add_argument("--out", type=Path, help="a CSV of what was found")
+    options = parser.parse_args()
+    chosen = [f for f in faults() if not options.names or f.name in options.names]
+    if unknown := set(options.names) - {f.name for f in chosen}:
+        parser.error(f"unknown faults: {', '.join(sorted(unknown))}")
+
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder, Progress() as progress:
+        jobs = min(options.jobs, len(chosen))
+        building = progress.add_task("building the trees", total=jobs)
+        trees: Queue[Tree] = Queue()
+
+        def ready(number: int) -> None:
+            tree = Tree((options.trees or Path(folder)) / str(number))
+            wrong = tree.build() or "; ".join(tree.failures(every=False) if number == 0 else [])
+            if wrong:
+                raise SystemExit(f"the tests must pass before faults are seeded: {wrong}")
+            trees.put(tree)
+            progress.advance(building)
+
+        def one(fault: Fault) -> Found:
+            tree = trees.get()
+            try:
+                found = tree.judge(fault, every=options.every)
+            finally:
+                trees.put(tree)
+            progress.print(f"{fault.name}: {found.outcome}, {found.by}", markup=False, highlight=False)
+            sys.stdout.flush()
+            progress.advance(judging)
+            return found
+
+        with ThreadPoolExecutor(jobs) as pool:
+            list(pool.map(ready, range(jobs)))
+            judging = progress.add_task("mutants", total=len(chosen))
+            table = list(pool.map(one, chosen))
+
+    return report(table, options.out)
+
+
+def report(table: list[Found], out: Path | None) -> int:
+    """Writes the table; 0 when every fault compiles and is killed, or is known to change nothing."""
+    if out:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with out.open("w", newline="") as file:
+            lines = csv.writer(file)
+            lines.writerow(["fault", "file", "what", "outcome", "killed by, or why not"])
+            lines.writerows([f.fault.name, f.fault.file, f.fault.what, f.outcome, f.by] for f in table)
+    bad = [f.fault.name for f in table if f.outcome != "killed" and not (f.outcome == "survived" and f.fault.survives)]
+    killed = sum(f.outcome == "killed" for f in table)
+    print(f"{killed} of {len(table)} killed" + (f"; not explained: {', '.join(bad)}" if bad else ""))
+    return 1 if bad else 0
+
+
+def handful(number: int, size: int = 4) -> list[Any]:
+    """A few faults that change with `number`, for continuous integration."""
+    everything = faults()
+    return [everything[(number * size + i) % len(everything)] for i in range(size)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
