@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test asan bench mutants lint
+.PHONY: help setup reproduce test verify asan bench mutants lint
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -16,6 +16,9 @@ reproduce:  ## every figure and verdict of the paper into results/ (ARGS go to s
 
 test:  ## all C++ and Python tests (ARGS go to pytest)
 	@bash tests/run.sh $(ARGS)
+
+verify: setup  ## every proof of the numbers into results/verification (ARGS go to snakemake)
+	@$(env) snakemake -s workflows/verify/Snakefile --quiet host reason $(ARGS)
 
 asan: setup  ## the C++ tests under the address and undefined behaviour sanitizers
 	@$(env) cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from warmslip import cli_verify
 from warmslip import scene as scenes
 from warmslip.scene import Scene, SceneError
 
@@ -224,6 +225,10 @@ def draw(
     from warmslip import figures
 
     figures.draw(kind, inputs, out)
+
+
+app.command()(cli_verify.verify)
+app.command()(cli_verify.report)
 
 
 @app.command("list")

@@ -1,54 +1,121 @@
-"""A manufactured solution with contact and slip on all of Gamma_C, its data derived by sympy from one description.
+"""Manufactured solutions with contact: fields that are what they claim to be, and runs measured against them.
 
-On the unit square with the supports of the paper's problem, u and theta vanish where they must, the body penetrates the
-foundation everywhere on the bottom (u_nu > g) and slides in one direction, so the data are smooth and O(h+k) is owed.
-What the contact law does not give is prescribed as an extra traction g_C and an extra flux on Gamma_C:
-
-    sigma nu + p_nu(u_nu - g) nu + p_tau w_tau/|w_tau| = g_C,        -q.nu + k_c (theta_F - theta) = -(extra flux)
+`slipping` is the one that the workflow runs. On the unit square with the supports of the paper's problem, u and theta vanish
+where they must, the body penetrates the foundation everywhere on the bottom (u_nu > g) and slides in one direction, so the
+data are smooth and O(h+k) is owed. What the contact law does not give is prescribed as an extra traction and an extra flux
+(symbolic.py). Numbers are dimensionless, as in the paper.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from warmslip import rates
+from warmslip import rates, symbolic
 from warmslip.errors import TERMS, ExactErrors, Largest
-from warmslip.loads import Array, Loads
-from warmslip.problem import mandel
+from warmslip.loads import Array
+from warmslip.problem import discretise
 from warmslip.runner import Run
 from warmslip.scene import Scene
+from warmslip.symbolic import Description, Manufactured, T, X, Y
+from warmslip.tables import PARTS
 
-X, Y, T = sp.symbols("x y t", real=True)
-
-
-@dataclass(frozen=True)
-class Manufactured:
-    """Exact fields (functions of positions and time) and the loads that produce them."""
-
-    u: Callable[[Array, float], Array]
-    w: Callable[[Array, float], Array]
-    theta: Callable[[Array, float], Array]
-    gradient: Callable[[Array, float], Array]
-    loads: Loads
+ROUNDING = 1e-10  # of scale: no contradiction, only floating point
+TIMES = 11  # at which a description is checked
 
 
-def _function(expression: Any) -> Callable[[Array, float], Array]:
-    """A sympy scalar or matrix as a function of positions (points, 2) and time."""
-    shape = expression.shape if isinstance(expression, sp.MatrixBase) else ()
-    flat = list(expression) if shape else [expression]
-    compiled = [sp.lambdify((X, Y, T), e, "numpy", cse=True) for e in flat]
-    columns = tuple(s for s in shape if s != 1)
+def derive(scene: Scene, fields: Description, points: int = 3) -> Manufactured:
+    """The loads under which `fields` solve the scene's problem, for fields that are what they claim to be.
 
-    def function(x: Array, t: float) -> Array:
-        values = [np.broadcast_to(f(x[:, 0], x[:, 1], t), (len(x),)) for f in compiled]
-        return np.stack(values, axis=1).reshape((len(x), *columns)) if shape else np.array(values[0])
+    They are checked on a grid of places and times. Raises ValueError, one sentence with the place, when they do not vanish on
+    the scene's supports, when they leave contact, stop, reverse or slip against their claim, when the friction traction leaves
+    the cone or does not oppose the slip, and when the law alone does not hold for fields that are said to obey it.
+    """
+    solution = symbolic.derive(scene, fields, points)
+    times = np.linspace(0, scene.time.end, TIMES)
+    supports = scene.supports
+    for name, field, parts in (
+        ("u", solution.u, supports.displacement),
+        ("theta", solution.theta, supports.temperature),
+    ):
+        for part in parts:
+            if any(np.abs(field(_places(scene, part), t)).max() > ROUNDING for t in times):
+                raise ValueError(f"{name} does not vanish on '{part}', where the scene holds it; change one of the two")
+    x = _places(scene, scene.contact.part)
+    for what, place, t in _contradictions(scene, fields, solution, x, times):
+        raise ValueError(f"{what} at x = {place.tolist()}, t = {t:g}; change the fields or the scene's data")
+    return solution
 
-    return function
+
+def _places(scene: Scene, part: str) -> Array:
+    """A grid of positions on a part of the box, (points, d)."""
+    place = PARTS[scene.mesh.shape].index(part)
+    along = [np.linspace(0, side, 101 if scene.mesh.dim == 2 else 21) for side in scene.mesh.sides]
+    along[place // 2] = along[place // 2][[-(place % 2)]]
+    return np.stack([c.ravel() for c in np.meshgrid(*along, indexing="ij")], axis=1)
+
+
+def _contradictions(
+    scene: Scene, fields: Description, solution: Manufactured, x: Array, times: Array
+) -> Iterator[tuple[str, Array, float]]:
+    """What is wrong on the contact part, and where and when first."""
+    touch, claim = solution.touch, fields.claim
+    load = max(np.abs(touch.pressure(x, t)).max() for t in times)
+    fast = max(np.abs(solution.w(x, t)).max() for t in times)
+    before: Array | None = None
+    for t in times:
+        with np.errstate(invalid="ignore", divide="ignore"):  # where nothing slips, slip has no direction
+            p, bound, friction, slip, extra = (
+                f(x, t) for f in (touch.pressure, touch.bound, touch.friction, touch.slip, touch.extra)
+            )
+        speed, force = np.linalg.norm(slip, axis=1), np.linalg.norm(friction, axis=1)
+        misfit = np.linalg.norm(friction * speed[:, None] - bound[:, None] * slip, axis=1)
+        faults = []
+        if claim != "mixed":
+            faults.append((~(p > ROUNDING * load), f"the fields leave contact where they should {claim}"))
+        if claim == "slip":
+            faults.append((~(speed > ROUNDING * fast), "the slip stops where it should go on"))
+            reverses = _turned(slip) if before is None else _turned(slip) | (np.sum(slip * before, axis=1) <= 0)
+            faults.append((reverses, "the slip reverses"))
+        if claim == "stick":
+            faults.append((speed > ROUNDING * fast, "the fields slip where they should stick"))
+            faults.append((~(force < bound), "the friction traction of sticking lies beyond the cone"))
+        faults.append((~(force <= bound + ROUNDING * load), "the friction traction lies beyond the cone"))
+        faults.append((~(misfit <= ROUNDING * load * fast), "the friction traction does not oppose the slip"))
+        if fields.own:
+            faults.append((~(np.abs(extra).max(axis=1) <= ROUNDING * load), "the law of friction alone does not hold"))
+        for where, what in faults:
+            if where.any():
+                yield what, x[np.argmax(where)], t
+        before = slip
+
+
+def _turned(slip: Array) -> Array:
+    """Where the slip (points, d) of a grid of places points against that of a neighbour, (points,)."""
+    dim = slip.shape[1]
+    grid = slip.reshape(*[round(len(slip) ** (1 / (dim - 1)))] * (dim - 1), dim)
+    found = np.zeros(grid.shape[:-1], dtype=bool)
+    for axis in range(dim - 1):
+        along = np.moveaxis(grid, axis, 0)
+        np.moveaxis(found, axis, 0)[1:] |= np.sum(along[1:] * along[:-1], axis=-1) <= 0
+    return np.asarray(found.ravel())
+
+
+def sliding() -> Description:
+    """The fields of `slipping`."""
+    # u_y < 0 on y = 0 presses the body into the foundation; u_x grows in time, so w_x > 0 there
+    u = sp.Matrix(
+        [
+            sp.Rational(1, 10) * (1 - Y**2) * (1 + sp.sin(sp.pi * X) / 2) * sp.exp(T),
+            -sp.Rational(1, 1000) * (1 - Y) * (2 + sp.cos(sp.pi * X)) * (1 + T / 2),
+        ]
+    )
+    # theta moves fast, so that the errors in time are seen beside those in space
+    theta = sp.sin(sp.pi * X) * (1 - Y) * (1 + Y / 2) * (2 + sp.sin(6 * T))
+    return Description(u, theta, claim="slip")
 
 
 def slipping(scene: Scene) -> Manufactured:
@@ -64,76 +131,18 @@ def slipping(scene: Scene) -> Manufactured:
         raise ValueError(
             "the manufactured solution is for a square clamped at the top and cooled at top, left and right"
         )
-    grow = sp.exp(T)
-    # u_y < 0 on y = 0 presses the body into the foundation; u_x grows in time, so w_x > 0 there
-    u = sp.Matrix(
-        [
-            sp.Rational(1, 10) * (1 - Y**2) * (1 + sp.sin(sp.pi * X) / 2) * grow,
-            -sp.Rational(1, 1000) * (1 - Y) * (2 + sp.cos(sp.pi * X)) * (1 + T / 2),
-        ]
-    )
-    # theta moves fast, so that the errors in time are seen beside those in space
-    theta = sp.sin(sp.pi * X) * (1 - Y) * (1 + Y / 2) * (2 + sp.sin(6 * T))
-    w = u.diff(T)
-    nu = sp.Matrix([0, -1])
-
-    def strain(v: Any) -> Any:
-        g = v.jacobian([X, Y])
-        return (g + g.T) / 2
-
-    def apply(tensor: Array, e: Any) -> Any:
-        root = sp.sqrt(2)
-        m = sp.Matrix([e[0, 0], e[1, 1], root * e[0, 1]])
-        s = sp.Matrix(3, 3, [sp.nsimplify(float(v), rational=True) for v in tensor.ravel()]) * m
-        return sp.Matrix([[s[0], s[2] / root], [s[2] / root, s[1]]])
-
-    heat = scene.heat
-    expansion, heating, conductivity = (
-        sp.Matrix(m) for m in (heat.expansion.tensor, heat.heating.tensor, heat.conductivity)
-    )
-    sigma = (
-        apply(mandel(scene.viscosity, 2), strain(w)) + apply(mandel(scene.elasticity, 2), strain(u)) - theta * expansion
-    )
-    q = -conductivity * sp.Matrix([theta.diff(X), theta.diff(Y)])
-    body = scene.inertia.density * w.diff(T) - sp.Matrix(
-        [sum(sigma[i, j].diff((X, Y)[j]) for j in range(2)) for i in range(2)]
-    )
-    source = (
-        theta.diff(T)
-        + q[0].diff(X)
-        + q[1].diff(Y)
-        - sum(heating[i, j] * strain(w)[i, j] for i in range(2) for j in range(2))
-    )
-    normals = {"left": sp.Matrix([-1, 0]), "right": sp.Matrix([1, 0])}
-    contact = scene.contact
-    pressure = contact.stiffness * (u.dot(nu) - contact.gap)
-    slip = sp.Matrix([1, 0])  # the direction of w_tau
-    extra = sigma * nu + pressure * nu + contact.friction.coefficient * pressure * slip
-    foundation = contact.heat_exchange.foundation_temperature
-    flux = -q.dot(nu) + contact.heat_exchange.conductance * (theta - foundation)
-
-    x = np.stack([np.linspace(0, 1, 101), np.zeros(101)], axis=1)
-    for t in (0.0, scene.time.end):
-        if (_function(u)(x, t)[:, 1] > -contact.gap).any() or (_function(w)(x, t)[:, 0] <= 0).any():
-            raise ValueError(
-                "the manufactured fields leave contact or reverse the slip with these data; reduce contact.gap"
-            )
-    loads = Loads(
-        body=_function(body),
-        source=_function(source),
-        traction={part: _function(sigma * n) for part, n in normals.items()},
-        contact_traction=_function(extra),
-        contact_flux=_function(flux),
-        gap=contact.gap,
-        foundation_temperature=foundation,
-        points=3,
-    )
-    return Manufactured(_function(u), _function(w), _function(theta), _function(u.jacobian([X, Y])), loads)
+    return derive(scene, sliding())
 
 
-def errors(scene: Scene, solution: Manufactured) -> tuple[dict[str, float], Run]:
-    """Largest errors over all times of a run with the manufactured data, and the run."""
-    job = Run(scene, loads=solution.loads)
+def errors(
+    scene: Scene, solution: Manufactured, *, mesh: Any = None, watch: Callable[[Run], None] | None = None
+) -> tuple[dict[str, float], Run]:
+    """Largest errors over all times of a run with the manufactured data, and the run.
+
+    `mesh` replaces the scene's structured one; `watch` sees the run after every step. Raises RuntimeError when a step is not
+    right.
+    """
+    job = Run(scene, discretisation=discretise(scene, loads=solution.loads, mesh=mesh))
     d = job.discretisation
     nodes = np.asarray(d.mesh.nodes)
     d.restart(job.stepper, solution.u(nodes, 0.0), solution.w(nodes, 0.0), solution.theta(nodes, 0.0), 0.0)
@@ -141,6 +150,8 @@ def errors(scene: Scene, solution: Manufactured) -> tuple[dict[str, float], Run]
     largest = Largest()
     for _ in job.steps():
         largest.add(measure.of(job.stepper))
+        if watch:
+            watch(job)
     if job.outcome != "right":
         raise RuntimeError(
             f"the manufactured run with n = {scene.mesh.n}, steps = {scene.time.steps} ended: {job.outcome}"

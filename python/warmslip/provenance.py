@@ -39,7 +39,7 @@ def fingerprint() -> str:
     """A hash of everything that solves: the compiled core and the Python modules that step it."""
     digest = hashlib.sha256()
     compiled = sorted(PACKAGE.parent.parent.glob("build/cp*/_core.*.so")) or sorted(PACKAGE.glob("_core.*.so"))
-    afterwards = {"cli", "__init__", "rates", "readings", "work", "judge"}
+    afterwards = {"cli", "cli_verify", "__init__", "rates", "readings", "work", "judge"}
     sources = sorted(p for p in PACKAGE.glob("*.py") if p.stem not in afterwards)
     for path in [*compiled, *sources, *sorted(PACKAGE.glob("scenes/*.toml"))]:
         digest.update(path.name.encode() + path.read_bytes())

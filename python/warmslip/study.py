@@ -118,8 +118,8 @@ def _next(steps: Any, run: Run) -> None:
         )
 
 
-def stamp(scene: Scene, **more: Any) -> dict[str, Any]:
-    """Provenance of a study's table."""
+def stamp(scene: Scene | None, **more: Any) -> dict[str, Any]:
+    """Provenance of a table."""
     return provenance.stamp(
         scene,
         petsc=_core.petsc_version,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import json
 import os
 import re
 import shutil
@@ -113,7 +114,23 @@ class Tree:
             found.append("a crash" if tests.returncode < 0 or native.returncode < 0 else "the tests did not run")
         return list(dict.fromkeys(found))
 
-    def judge(self, fault: Fault, *, every: bool) -> Found:
+    def verdict(self) -> list[str]:
+        """What the small workflow finds: the checks that its verdict fails, or the jobs that stopped before it."""
+        environment = self.at / ".venv"
+        if not environment.exists():
+            environment.symlink_to(ROOT / ".venv")
+        result = self._run(
+            *("bash", "-c", ". workflows/env.sh && exec snakemake --cores 2 --keep-going --configfile $0 judged"),
+            "workflows/config/ci.yaml",
+        )
+        stopped = re.findall(r"Error in rule (\w+)", result.stdout + result.stderr)
+        failed = [job for job in dict.fromkeys(stopped) if job != "judged"]
+        written = self.at / "results/runs/ci/paper/verdict.json"
+        if "judged" in stopped:
+            failed += json.loads(written.read_text())["failed"]
+        return failed
+
+    def judge(self, fault: Fault, *, every: bool, workflow: bool) -> Found:
         path = self.at / fault.file
         original = path.read_text()
         path.write_text(original.replace(fault.old, fault.new))
@@ -122,6 +139,8 @@ class Tree:
             if error:
                 return Found(fault, "invalid", error)
             failed = self.failures(every=every)
+            if workflow:
+                failed += [f"workflow: {name}" for name in self.verdict()]
             return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
         finally:
             path.write_text(original)
@@ -132,6 +151,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help="faults to try (default: all)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="trees at work at once")
     parser.add_argument("--every", action="store_true", help="run all tests, not only up to the first that fails")
+    parser.add_argument("--workflow", action="store_true", help="run the small workflow as well, for its verdict")
     parser.add_argument("--trees", type=Path, help="where to keep the built trees for the next time (default: nowhere)")
     parser.add_argument("--out", type=Path, help="a CSV of what was found")
     options = parser.parse_args()
@@ -155,7 +175,7 @@ def main() -> int:
         def one(fault: Fault) -> Found:
             tree = trees.get()
             try:
-                found = tree.judge(fault, every=options.every)
+                found = tree.judge(fault, every=options.every, workflow=options.workflow)
             finally:
                 trees.put(tree)
             progress.print(f"{fault.name}: {found.outcome}, {found.by}", markup=False, highlight=False)

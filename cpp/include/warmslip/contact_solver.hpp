@@ -37,12 +37,12 @@ struct ContactSolution {
   int iterations = 0;       ///< Newton steps of all stages
   int factorizations = 0;   ///< of the dense tangent
   double law_residual = 0;  ///< of the contact law, relative; accepted up to tolerance + floor
-  double floor = 0;         ///< round-off of evaluating the law: c_nu eps |u| over the largest pressure
+  double floor = 0;         ///< round-off of evaluating the law: c_nu eps (|u| + k |free|) over the largest pressure
 };
 
 /// How far (force, velocity) is from the law, relative to the largest force and the largest free velocity: the worst of
 /// |lambda_nu - p_nu(r_n)|, (|lambda_tau| - T)^+ and T |w_tau| - lambda_tau . w_tau over the points. `floor` receives
-/// what the rounding of r alone can cause: no digits of the pressure below c_nu eps |u| can be had.
+/// what the rounding of r alone can cause: no digits of the pressure below c_nu eps (|u| + k |free|) can be had.
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
                     double* floor);

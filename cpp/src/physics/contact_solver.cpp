@@ -19,8 +19,10 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     largest =
         std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
     fastest = std::max({fastest, problem.free.template segment<d>(at).norm(), velocity.template segment<d>(at).norm()});
+    // the velocity is what the contact force leaves of the free one
     const double terms =
-        point.displacement.norm() + std::abs(point.gap) + problem.step * velocity.template segment<d>(at).norm();
+        point.displacement.norm() + std::abs(point.gap) +
+        problem.step * (velocity.template segment<d>(at).norm() + problem.free.template segment<d>(at).norm());
     rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
   }
   *floor = std::numeric_limits<double>::infinity();

@@ -17,7 +17,7 @@ Drawing = Callable[[list[Path]], "tuple[Figure, str]"]
 
 def drawings() -> dict[str, Drawing]:
     """Every kind of figure by name."""
-    from warmslip.figures import convergence, fields, maps, setting, tradeoff
+    from warmslip.figures import convergence, fields, maps, setting, tradeoff, verification
 
     return {
         "setting": setting.setting,
@@ -30,6 +30,8 @@ def drawings() -> dict[str, Drawing]:
         "table": maps.table,
         "extremes": maps.extremes,
         "work": tradeoff.work,
+        "graded": verification.graded,
+        "verdicts": verification.verdicts,
     }
 
 

@@ -1,0 +1,54 @@
+"""Lines and their report: bands, nan, failures, refusals, and the command that writes them."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from warmslip.verify import line, report, topics
+from warmslip.verify.line import Line
+
+
+def one(observed: float = 1.0) -> Line:
+    return line.near("a | case", "the answer is one", "analytic", 1.0, observed, 1e-3)
+
+
+@pytest.mark.parametrize(("observed", "passed"), [(1.0, True), (1.0009, True), (1.0011, False), (float("nan"), False)])
+def test_bands_have_two_sides(observed: float, passed: bool) -> None:
+    assert one(observed).passed is passed
+    assert one(2 - observed).passed is passed
+
+
+def test_below_and_order() -> None:
+    assert line.below("c", "p", "identity", 0.0, 1e-11).passed
+    assert not line.below("c", "p", "identity", 1e-10, 1e-11).passed
+    assert line.order("c", "p", "theory", 1.0, 0.89).passed
+    assert not line.order("c", "p", "theory", 1.0, 0.87).passed
+    assert not line.order("c", "p", "theory", 1.0, float("nan")).passed
+
+
+def test_the_report_counts_and_shows_failures(tmp_path: Path) -> None:
+    assert line.write(tmp_path / "good.csv", [one()], {"version": "0"})
+    assert not line.write(tmp_path / "bad.csv", [one(), one(2.0)], {"version": "0"})
+    text, passed = report.markdown([tmp_path / "good.csv", tmp_path / "bad.csv"], [], {"good": "What is good"})
+    assert not passed
+    assert "**2 of 3 lines pass.**" in text
+    assert text.count("**FAIL**") == 1
+    assert "a \\| case" in text
+    assert "What is good" in text
+    with (tmp_path / "bad.csv").open() as file:
+        assert [row["verdict"] for row in csv.DictReader(file)] == ["pass", "FAIL"]
+
+
+def test_a_topic_without_lines_proves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="proves nothing"):
+        line.write(tmp_path / "none.csv", [], {})
+    (tmp_path / "none.csv").write_text("case,proves,origin,expected,observed,low,high,verdict\n")
+    with pytest.raises(ValueError, match="proves nothing"):
+        report.markdown([tmp_path / "none.csv"], [], {})
+
+
+def test_every_topic_says_what_it_is() -> None:
+    assert all(run.__doc__ for run in topics.TOPICS.values())
