@@ -8,7 +8,7 @@ env := . workflows/env.sh &&
 help:  ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
-setup:  ## system packages, .venv and the compiled package (two minutes once, then a second)
+setup:  ## system packages, .venv and the compiled package (five to ten minutes once, most of it compiling, then a second)
 	@bash workflows/setup.sh
 
 reproduce:  ## every figure and verdict of the paper into results/ (ARGS go to snakemake)

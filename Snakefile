@@ -5,6 +5,7 @@ include: "workflows/Snakefile"
 rule all:
     default_target: True
     input:
+        rules.fields.input,
         rules.figures.input,
         rules.tables.input,
         rules.verdict.output,

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes this checkout ready to use: system packages, a virtual environment in .venv, the compiled package.
-# About two minutes the first time, about a second after that. Safe to repeat.
+# Five to ten minutes the first time, most of it compiling; about a second after that. Safe to repeat.
 #
 # With PETSC_DIR set (a cluster's module, conda, an own build) no system package is touched, PYTHON (default: python3) is
 # the interpreter and petsc4py is compiled against that PETSc, which takes another two minutes.
@@ -58,7 +58,7 @@ fi
 # the package is installed anew when its metadata changes; its C++ is rebuilt at import when a source changes
 stamp=$(sha256sum <"$root/pyproject.toml")
 if [[ $(cat "$venv/.stamp" 2>/dev/null) != "$stamp" ]]; then
-  log "installing warmslip and what it needs (about a minute)"
+  log "compiling warmslip and installing what it needs (about five minutes of CPU, no output until it is done)"
   # a petsc4py built against NumPy 1 cannot be loaded beside NumPy 2
   old=$("$venv/bin/python" -c 'import numpy; print("numpy<2" if numpy.__version__ < "2" else "numpy")')
   pip install --no-build-isolation --config-settings=editable.rebuild=true -e "$root[test,workflow]" "$old"

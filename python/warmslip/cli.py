@@ -14,13 +14,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from warmslip import cli_verify
 from warmslip import scene as scenes
+from warmslip.cli_verify import SceneName, Set
 from warmslip.scene import Scene, SceneError
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 console = Console(stderr=True)
 
-SceneName = Annotated[str, typer.Argument(help="a scene of the library by name, or the path of a TOML file")]
-Set = Annotated[list[str] | None, typer.Option("--set", help="table.key=value, any number of times")]
 Csv = Annotated[Path, typer.Option(help="the CSV file to write; its stamp goes beside it as .json")]
 Tables = Annotated[list[Path], typer.Argument(help="tables written by `warmslip study`")]
 
@@ -71,12 +70,19 @@ def run(
 
         result = warmslip.run(checked, out=out, backend=backend, progress=progress)
     if rank == 0:
-        worst = max(result.summary["identities"][i] for i in ("energy", "heat", "force", "law"))
-        typer.echo(
-            f"{result.outcome}: {result.summary['steps']} steps, worst identity {worst:.1e}, see {out}/summary.json"
-        )
+        typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
     if not result.right:
         raise typer.Exit(1)
+
+
+def _told(summary: dict[str, Any]) -> str:
+    """The end of a run in a few words; of one that stopped, the residuals of the step that was not taken."""
+    failure = summary["failure"]
+    if failure is None:
+        worst = max(summary["identities"][i] for i in ("energy", "heat", "force", "law"))
+        return f"{summary['steps']} steps, worst identity {worst:.1e}"
+    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.1e}" for name, value in failure.items() if name != "step")
+    return f"step {failure['step']} was not taken ({numbers})"
 
 
 @app.command()
@@ -227,6 +233,7 @@ def draw(
     figures.draw(kind, inputs, out)
 
 
+app.command()(cli_verify.check)
 app.command()(cli_verify.verify)
 app.command()(cli_verify.report)
 

@@ -1,4 +1,4 @@
-"""The verification commands: topics, report."""
+"""The verification commands: check a scene's assumptions, verify a topic, write the report."""
 
 from __future__ import annotations
 
@@ -6,6 +6,33 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from warmslip import scene as scenes
+
+SceneName = Annotated[str, typer.Argument(help="a scene of the library by name, or the path of a TOML file")]
+Set = Annotated[list[str] | None, typer.Option("--set", help="table.key=value, any number of times")]
+
+
+def check(
+    scene: SceneName,
+    out: Annotated[
+        Path | None, typer.Option(help="also write the findings here, .csv (stamp beside it) or .json")
+    ] = None,
+    set_: Set = None,
+) -> None:
+    """Audit a scene: which assumptions of the theory hold, by how much, and what follows. Takes no step, blocks nothing."""
+    from mpi4py import MPI
+    from rich.console import Console
+
+    from warmslip import study as studies
+    from warmslip.verify import audit, audit_report
+
+    checked = scenes.load(scene, set_)
+    found = audit.audit(checked)
+    if MPI.COMM_WORLD.rank == 0:
+        Console().print(audit_report.table(found, checked.title))
+        if out is not None:
+            audit_report.write(out, found, studies.stamp(checked))
 
 
 def verify(
@@ -27,7 +54,7 @@ def verify(
     if topic not in TOPICS:
         raise ValueError(f"unknown topic '{topic}'; give one of {', '.join(TOPICS)}")
     found = TOPICS[topic](out.parent)
-    passed = line.write(out, found, stamp(None, topic=topic))
+    passed = line.write(out, found, stamp(None, title=title(TOPICS[topic])))
     for one in found:
         if not one.passed:
             typer.echo(
@@ -46,10 +73,8 @@ def report(
 ) -> None:
     """Put the lines of all topics into one report."""
     from warmslip.verify import report as writing
-    from warmslip.verify.topics import TOPICS
 
-    titles = {name: title(run) for name, run in TOPICS.items()}
-    text, passed = writing.markdown(tables, figures or [], titles)
+    text, passed = writing.markdown(tables, figures or [])
     out.write_text(text)
     typer.echo(f"{'passed' if passed else 'FAILED'}: read {out}")
     if fail and not passed:

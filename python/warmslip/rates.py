@@ -86,12 +86,13 @@ def williams_exponent(lam: float, mu: float, angle: float = np.pi / 2) -> float:
 def entitled(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tuple[float, float]) -> float:
     """The order in h = k that the paper's scene is entitled to, by term (verification notes, section 4).
 
-    |u|_V is held back by the clamped-free corners, |theta|_L2 by theta_F = 10 against theta_0 = 0 (O(k^(3/4)) in the
-    maximum over time) or by a singular K (a jump across x = y, O(h^(1/2))), which |u|_V then inherits.
+    |u|_V is held back by the clamped-free corners; |w|_L2 by tractions that act from t = 0 on a body at rest, and
+    |theta|_L2 by theta_F = 10 against theta_0 = 0 (each O(k^(3/4)) in the maximum over time) or by a singular K (a jump
+    across x = y, O(h^(1/2))), which |u|_V then inherits.
     """
     theta = 0.5 if singular_conductivity else 0.75 if hot else 1.0
     u = min(williams_exponent(*viscosity), 1.0, theta if singular_conductivity else 1.0)
-    single = {"u_V": u, "w_L2": min(1.0, 2 * u), "theta_L2": theta}
+    single = {"u_V": u, "w_L2": min(0.75, 2 * u), "theta_L2": theta}
     return single[term] if term in single else min(single[one] for one in SUMS[term])
 
 

@@ -173,9 +173,9 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
             text = path.read_text()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not a text file"
-            raise SceneError(
-                f"cannot read scene '{scene}' ({reason}); give a file or one of {', '.join(library())}"
-            ) from None
+            near = difflib.get_close_matches(str(scene), library(), 1)
+            hint = f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}"
+            raise SceneError(f"cannot read scene '{scene}' ({reason}); {hint}") from None
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -231,7 +231,7 @@ def _sentence(error: Any) -> str:
         case "extra_forbidden":
             allowed = _allowed(where[:-1])
             near = difflib.get_close_matches(where[-1], allowed, 1)
-            hint = f"did you mean '{near[0]}'" if near else f"the keys here are {', '.join(allowed)}"
+            hint = f"did you mean '{near[0]}'?" if near else f"the keys here are {', '.join(allowed)}"
             return f"{key}: unknown key; {hint}"
         case "missing":
             return f"{key}: missing; add it"

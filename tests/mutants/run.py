@@ -117,8 +117,8 @@ class Tree:
     def verdict(self) -> list[str]:
         """What the small workflow finds: the checks that its verdict fails, or the jobs that stopped before it."""
         environment = self.at / ".venv"
-        if not environment.exists():
-            environment.symlink_to(ROOT / ".venv")
+        environment.unlink(missing_ok=True)
+        environment.symlink_to(sys.prefix)
         result = self._run(
             *("bash", "-c", ". workflows/env.sh && exec snakemake --cores 2 --keep-going --configfile $0 judged"),
             "workflows/config/ci.yaml",

@@ -30,9 +30,9 @@ def test_below_and_order() -> None:
 
 
 def test_the_report_counts_and_shows_failures(tmp_path: Path) -> None:
-    assert line.write(tmp_path / "good.csv", [one()], {"version": "0"})
-    assert not line.write(tmp_path / "bad.csv", [one(), one(2.0)], {"version": "0"})
-    text, passed = report.markdown([tmp_path / "good.csv", tmp_path / "bad.csv"], [], {"good": "What is good"})
+    assert line.write(tmp_path / "good.csv", [one()], {"title": "What is good"})
+    assert not line.write(tmp_path / "bad.csv", [one(), one(2.0)], {"title": "What is not"})
+    text, passed = report.markdown([tmp_path / "good.csv", tmp_path / "bad.csv"], [])
     assert not passed
     assert "**2 of 3 lines pass.**" in text
     assert text.count("**FAIL**") == 1
@@ -45,9 +45,10 @@ def test_the_report_counts_and_shows_failures(tmp_path: Path) -> None:
 def test_a_topic_without_lines_proves_nothing(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="proves nothing"):
         line.write(tmp_path / "none.csv", [], {})
+    (tmp_path / "none.json").write_text('{"title": "Nothing"}')
     (tmp_path / "none.csv").write_text("case,proves,origin,expected,observed,low,high,verdict\n")
     with pytest.raises(ValueError, match="proves nothing"):
-        report.markdown([tmp_path / "none.csv"], [], {})
+        report.markdown([tmp_path / "none.csv"], [])
 
 
 def test_every_topic_says_what_it_is() -> None:

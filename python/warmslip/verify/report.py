@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,9 +32,10 @@ def read(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def markdown(tables: Sequence[Path], figures: Sequence[Path], titles: dict[str, str]) -> tuple[str, bool]:
-    """The report and whether all lines passed. Raises ValueError for a table without lines."""
+def markdown(tables: Sequence[Path], figures: Sequence[Path]) -> tuple[str, bool]:
+    """The report and whether all lines passed; titles come from the stamps. Raises ValueError for a table without lines."""
     topics = {path.stem: read(path) for path in tables}
+    titles = {path.stem: json.loads(path.with_suffix(".json").read_text())["title"] for path in tables}
     empty = [name for name, rows in topics.items() if not rows]
     if empty:
         raise ValueError(f"no lines in {', '.join(empty)}: a verification that checks nothing proves nothing")
@@ -47,14 +49,14 @@ def markdown(tables: Sequence[Path], figures: Sequence[Path], titles: dict[str, 
     summary = f"**{total - wrong} of {total} lines pass.** Where the expected numbers come from: {counts}."
     out = [HEAD.format(summary=summary)]
     out += [
-        f"| [{name}](#{name}) | {titles.get(name, '')} | {len(rows)} | {failed[name] or ''} |\n"
+        f"| [{name}](#{name}) | {titles[name]} | {len(rows)} | {failed[name] or ''} |\n"
         for name, rows in topics.items()
     ]
     for figure in figures:
         caption = figure.with_suffix(".rst")
         out.append(f"\n![{figure.stem}]({figure.name})\n\n{caption.read_text().strip() if caption.exists() else ''}\n")
     for name, rows in topics.items():
-        out.append(f"\n## {name}\n\n{titles.get(name, '')}\n\n")
+        out.append(f"\n## {name}\n\n{titles[name]}\n\n")
         out.append(
             "| case | what it proves | origin | expected | observed | band | |\n| --- | --- | --- | --- | --- | --- | --- |\n"
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import warmslip
-from warmslip.verify import closed_forms, graded, invariances, solutions, uncertainty
+from warmslip.verify import bound, closed_forms, existence, graded, invariances, solutions, uncertainty
 from warmslip.verify.line import Line
 
 Topic = Callable[[Path], list[Line]]
@@ -68,10 +68,16 @@ def value_and_uncertainty(folder: Path) -> list[Line]:
     return [line for path in studies for line in uncertainty.lines(path)]
 
 
+def theory(folder: Path) -> list[Line]:
+    """The existence proof run as an algorithm, and the error bound of the theorem term by term."""
+    return [*existence.lines(), *bound.lines()]
+
+
 TOPICS: dict[str, Topic] = {
     "exact_answers": exact_answers,
     "manufactured": manufactured,
     "unchanged": unchanged,
+    "theory": theory,
     "uncertainty": value_and_uncertainty,
     "true_orders": true_orders,
 }
