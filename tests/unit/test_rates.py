@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import warmslip
 from warmslip import judge, rates, readings
 from warmslip.errors import SUMS, TERMS
 from warmslip.runner import IDENTITIES
@@ -72,6 +73,9 @@ def test_entitled_orders() -> None:
     assert rates.entitled("theta_L2", **free) == 1.0
     assert rates.entitled("theta_L2", **free | {"hot": True}) == 0.75
     assert rates.entitled("theta_L2", **free | {"singular_conductivity": True}) == 0.5
+    both = free | {"hot": True, "singular_conductivity": True}
+    assert rates.entitled("theta_L2", **both) == rates.entitled("u_V", **both) == 0.5
+    assert rates.entitled("w_L2", **free) == 0.75  # tractions that act from t = 0 on a body at rest
     assert rates.entitled("u_theta", **free) == rates.entitled("u_V", **free) == rates.williams_exponent(10, 5)
 
 
@@ -85,6 +89,20 @@ def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> l
         )
         rows.append(row | {f"identity_{i}": 1e-15 for i in IDENTITIES})
     return rows
+
+
+def test_table_of_orders(tmp_path: Path) -> None:
+    """Along h = k, in order, against the last row as the reference, whose bias is taken off."""
+    scene = warmslip.load("paper_mixed").resolved()
+    rows = [r | {f"e_{t}": r["h"] ** 1.0 - 1 / 256 for t in [*TERMS, *SUMS]} for r in study_rows()[:-1]]
+    off = rows[0] | {"steps": 32, "e_theta_L2": 99.0}  # not on the diagonal
+    found = rates.table(write(tmp_path / "mixed_0_staggered.csv", [off, *reversed(rows), study_rows()[-1]]), scene)
+    own = [r for r in found if r["term"] == "theta_L2"]
+    assert [r["h"] for r in own] == [1 / n for n in LEVELS]
+    assert math.isnan(own[0]["observed"])
+    assert [r["observed"] for r in own[1:]] == pytest.approx([1.10, 1.22, 1.58], abs=0.005)
+    assert [r["corrected"] for r in own[1:]] == pytest.approx([1.0] * 3, abs=1e-9)
+    assert {r["entitled"] for r in own} == {1.0}
 
 
 def test_readings_judge_the_claims(tmp_path: Path) -> None:
@@ -129,6 +147,28 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
     assert spoil(outcome="contact_not_converged") == ["case runs that did not end right"]
     assert spoil(identity_law=1e-10) == ["case law identity"]
     assert spoil(identity_heat=math.nan) == ["case heat identity"]
+
+
+def test_a_verdict_needs_something_to_judge(tmp_path: Path) -> None:
+    nothing = dict(studies=[], manufactured_table=None, readings=None, extremes=None, expected={})
+    assert not judge.verdict(**nothing)["passed"]
+    cells = [{"ladder": "gap g", "value": 0.0, "verdict": v} for v in ("right", "WRONG")]
+    table = write(tmp_path / "extremes.csv", cells)
+    failed = judge.verdict(**nothing | {"extremes": table, "expected": {"extremes gap g 0.0 verdict": "right"}})[
+        "failed"
+    ]
+    assert "extremes cells silently wrong" in failed
+
+
+@pytest.mark.parametrize(("order", "falls_short"), [(1.0, False), (0.8, True), (1.4, True)])
+def test_orders_have_a_band(tmp_path: Path, order: float, falls_short: bool) -> None:
+    rows = []
+    for n in (8, 16, 32, 64):
+        row = {"path": "h=k", "coupling": "staggered", "n": n, "h": 1 / n, "open": 0, "stick": 0}
+        rows.append(row | {f"e_{t}": (64 / n) ** order for t in TERMS} | {f"identity_{i}": 0.0 for i in IDENTITIES})
+    checks = judge.manufactured(write(tmp_path / "m.csv", rows), {})
+    short = {c.name for c in checks if c.name.endswith(" order") and not c.passed}
+    assert short == ({f"manufactured h=k staggered {t} order" for t in TERMS} if falls_short else set())
 
 
 def test_near_is_two_sided() -> None:

@@ -23,6 +23,9 @@ def test_bands_have_two_sides(observed: float, passed: bool) -> None:
 
 def test_below_and_order() -> None:
     assert line.below("c", "p", "identity", 0.0, 1e-11).passed
+    assert not line.below("c", "p", "identity", -1e-3, 1e-11).passed
+    assert line.near("c", "p", "analytic", 0.0, 0.9, 0.1, scale=10.0).passed
+    assert not line.near("c", "p", "analytic", 0.0, 1.1, 0.1, scale=10.0).passed
     assert not line.below("c", "p", "identity", 1e-10, 1e-11).passed
     assert line.order("c", "p", "theory", 1.0, 0.89).passed
     assert not line.order("c", "p", "theory", 1.0, 0.87).passed

@@ -71,6 +71,39 @@ def test_trajectory_holds_the_run(small: MakeScene, tmp_path: Path) -> None:
         assert t.scene == small().resolved()
 
 
+def test_trajectory_and_summary_agree(small: MakeScene, tmp_path: Path) -> None:
+    """Times of the steps, worst identities as maxima over the steps, penetration against displacement and gap."""
+    scene = small(contact__gap=-1e-3, time__steps=5)
+    contact = warmslip.run(scene, out=tmp_path).summary
+    with Trajectory(tmp_path / "trajectory.h5") as t:
+        steps, ledger = t.series("steps"), t.series("ledger")
+        assert steps["time"] == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+        for name in ("energy", "heat", "force", "law"):
+            assert contact["identities"][name] == ledger[f"{name}_residual"].max()
+        bottom = t.u[-1][:5]
+    assert contact["contact"]["max_penetration"] == pytest.approx((-bottom[:, 1]).max() + 1e-3, rel=1e-12)
+
+
+def test_restart_under_a_moving_gap(small: MakeScene) -> None:
+    """The energy that a moving foundation puts in is that of the gap before and after, and a restart knows the former."""
+    scene = small("isotropic", time__steps=6)
+    loads = replace(warmslip.Loads.of(scene), gap=lambda x, t: -1e-3 * (1 + t) + 0 * x[:, 0])
+    job = warmslip.Run(scene, loads=loads)
+    ledgers = [report.ledger for report in job.steps()]
+    gained = sum(ledger.contact_change for ledger in ledgers)
+    d, half = job.discretisation, warmslip.Run(scene, loads=loads)
+    assert gained == pytest.approx(ledgers[-1].contact - 0.5 * 1e4 * 1e-6, rel=1e-9)  # c_nu/2 g(0)^2 over a side of 1
+    marching = half.steps()
+    for _ in range(3):
+        next(marching)
+    state = [d.field(getattr(half.stepper, name)) for name in FIELDS]
+    again = d.stepper()
+    d.restart(again, state[0], state[1], state[2], 0.5)
+    ledger = again.advance(*d.load_vectors.at(4 / 6)).ledger
+    for name in ("gap_work", "contact_change", "contact"):
+        assert getattr(ledger, name) == pytest.approx(getattr(ledgers[3], name), rel=1e-9), name
+
+
 def test_states_are_thinned(small: MakeScene, tmp_path: Path) -> None:
     warmslip.run(small(time__steps=5, output__every=2), out=tmp_path)
     with Trajectory(tmp_path / "trajectory.h5") as t:

@@ -37,6 +37,8 @@ REFUSED = [
     ("elasticity.young=-2", "elasticity.young = -2"),
     ("elasticity.poisson=1.5", "poisson must lie between -1 and 1"),
     ("viscosity.lame=[1.0]", "viscosity.lame"),
+    ("elasticity={young=2.0, poisson=0.6, assumption='plane_strain'}", "poisson must lie between -1 and 0.5"),
+    ("viscosity.lame=[-10.0,5.0]", "viscosity: the tensor must not be negative"),
     ("viscosity.lame=[10.0,-5.0]", "viscosity: the tensor must not be negative"),
     ("viscosity.young=1.0", "viscosity: give either lame or young"),
     ("heat.conductivity=[[1.0,2.0],[0.0,1.0]]", "heat.conductivity must be symmetric"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ CORNERS = {(0.0, 1.0): 0.69, (1.0, 1.0): 0.69}
         (1.5 * np.pi, (False, False), 0.544483736782464),  # the L-shaped domain
         (2 * np.pi, (False, False), 0.5),  # a crack
         (2 * np.pi, (True, True), 0.5),
+        (1.5 * np.pi, (True, True), 0.6018077748921468),  # c = 2: sin^2(1.5 pi L) = L^2 / 4, by bisection
         (np.pi, (True, False), 0.5),  # a clamp that ends on a straight side
         (np.pi / 2, (False, False), 2.0),
     ],
@@ -72,8 +74,13 @@ def test_graded_meshes_are_nested_and_graded() -> None:
         for part, facets in fine.parts.items():
             assert len(facets) == 2 * len(coarse.parts[part])
     finest = meshes[-1].nodes
-    near = np.sort(np.linalg.norm(finest - [0.0, 1.0], axis=1))[1]
-    assert near == pytest.approx(0.25 * grading.ratio(0.69) ** 3)
+    for corner in CORNERS:  # every edge at it is graded, whichever end it is
+        at = int(np.linalg.norm(finest - corner, axis=1).argmin())
+        cells = meshes[-1].cells[(meshes[-1].cells == at).any(axis=1)]
+        lengths = np.linalg.norm(finest[np.setdiff1d(cells, at)] - corner, axis=1)
+        assert lengths.max() <= 0.25 * np.sqrt(2) * grading.ratio(0.69) ** 3 + 1e-15
+    assert grading.ratio(0.69) < 2 ** (-1 / 0.69)  # at equality a logarithm is lost
+    assert grading.ratio(1.0) == 0.5
 
 
 def test_grading_is_refused_where_it_cannot_be() -> None:
@@ -145,6 +152,33 @@ def test_uncertainty_covers_the_limit(p: float) -> None:
     assert found.limit == pytest.approx(5.0, abs=1e-7)
     assert found.uncertainty == pytest.approx(1.25 * 0.3 * h[0] ** p, rel=1e-4)
     assert abs(found.value - 5) <= found.uncertainty
+
+
+def test_uncertainty_of_scattered_data_by_hand() -> None:
+    """Two fits by hand: the deviation of a power needs three freedoms, and weights go to the finest grids."""
+    h = np.array([1.0, 2.0, 4.0, 8.0])
+    phi = 1 + 0.1 * h + np.array([0.01, -0.01, 0.01, -0.01])
+    found = uncertainty.extrapolate(h, phi)
+    for weights in (np.full(4, 0.25), (1 / h) / np.sum(1 / h)):
+        basis = np.stack([np.ones(4), h**found.order], axis=1) * np.sqrt(weights)[:, None]
+        a = np.linalg.lstsq(basis, phi * np.sqrt(weights), rcond=None)[0]
+        deviation = np.sqrt(np.sum(4 * weights * (phi - a[0] - a[1] * h**found.order) ** 2) / (4 - 3))
+        if deviation == pytest.approx(found.deviation, rel=1e-6):
+            assert found.limit == pytest.approx(a[0], rel=1e-6)
+            break
+    else:
+        pytest.fail(f"neither fit has the deviation {found.deviation}")
+
+
+def test_held_out_values_can_fail(tmp_path: Path) -> None:
+    """The finest value must not have been seen by the interval it is tried on."""
+    lines = ["n,steps,h," + ",".join(uncertainty.FUNCTIONALS)]
+    for n in (16, 32, 64, 128, 256):
+        value = 1 + 1 / n + (0.5 if n == 256 else 0.0)
+        lines.append(f"{n},{n},{1 / n}," + ",".join([str(value)] * len(uncertainty.FUNCTIONALS)))
+    path = tmp_path / "mixed_0_staggered.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert not any(line.passed for line in uncertainty.lines(path))
 
 
 def test_uncertainty_grows_with_scatter() -> None:
