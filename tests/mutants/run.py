@@ -21,7 +21,7 @@ import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rich.progress import Progress
 
@@ -203,12 +203,6 @@ def report(table: list[Found], out: Path | None) -> int:
     killed = sum(f.outcome == "killed" for f in table)
     print(f"{killed} of {len(table)} killed" + (f"; not explained: {', '.join(bad)}" if bad else ""))
     return 1 if bad else 0
-
-
-def handful(number: int, size: int = 4) -> list[Any]:
-    """A few faults that change with `number`, for continuous integration."""
-    everything = faults()
-    return [everything[(number * size + i) % len(everything)] for i in range(size)]
 
 
 if __name__ == "__main__":
