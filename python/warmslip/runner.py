@@ -168,11 +168,10 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / "summary.json").unlink(missing_ok=True)  # it would speak of another run
     job = Run(scene, comm=comm, loads=loads, backend=backend)
     rank = job.comm.rank
     path = folder / "trajectory.h5" if folder is not None else None
-    if folder is not None and rank == 0:
-        (folder / "summary.json").unlink(missing_ok=True)  # it would speak of another run
     with TrajectoryWriter(path, job.discretisation, job.stepper, job.comm) as writer:
         for report in job.steps():
             writer.step(report)

@@ -15,6 +15,9 @@ from pydantic import ValidationError, model_validator
 from warmslip import tables as t
 
 
+SHORTEST = 1e-150  # step, time: its inverse is squared on the way
+
+
 class SceneError(ValueError):
     """A scene that cannot be run; the message is one sentence a problem, each with its key and its cure."""
 
@@ -43,6 +46,8 @@ class Scene(t.Table):
                 "supports.displacement: the momentum operator is singular without support and without inertia; "
                 "clamp a part or give inertia.density > 0"
             )
+        if self.step < SHORTEST:
+            problems.append(f"time: a step of {self.step:g} is too short to divide by; take fewer steps or a later end")
         if problems:
             raise ValueError("\n".join(problems))
         return self

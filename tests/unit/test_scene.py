@@ -27,6 +27,7 @@ REFUSED = [
     ("mesh=4", "mesh"),
     ("time.end=0", "time.end"),
     ("time.end=inf", "time.end: inf is not a finite number"),
+    ("time.end=1e-320", "too short to divide by"),
     ("time.steps=0", "time.steps = 0"),
     ("time.steps=-3", "time.steps = -3"),
     ("time.steps=1.5", "time.steps = 1.5"),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 from reference import scipy_scheme
 
 import warmslip
@@ -123,6 +124,42 @@ def test_moving_gap() -> None:
     one = scene("isotropic", time__steps=16)
     loads = replace(Loads.of(one), gap=lambda x, t: 1e-3 * np.sin(9 * t) + 1e-3 * x[:, 0])
     check(one, loads=loads)
+
+
+@pytest.mark.parametrize(("theta", "k"), [(1.0, 1e-5), (300.0, 1e-5), (300.0, 1e-7)])
+@pytest.mark.parametrize("tolerance", [None, 1e-8])
+def test_small_changes_of_large_contents(tolerance: float | None, theta: float, k: float) -> None:
+    """A warm body in short steps: rounding of its content is no defect, a heat system solved to 1e-8 only is one."""
+    steps = 20
+    one = scene(
+        **{"time__steps": steps, "time__end": k * steps, "initial__temperature": theta, "supports__temperature": []},
+        heat__expansion__tensor=[[0.0, 0.0], [0.0, 0.0]],
+        heat__heating__tensor=[[0.0, 0.0], [0.0, 0.0]],
+    )
+    options = PETSc.Options()
+    loose = {"heat_ksp_type": "cg", "heat_pc_type": "jacobi", "heat_ksp_rtol": tolerance} if tolerance else {}
+    try:
+        for key, value in loose.items():
+            options[key] = value
+        result = warmslip.run(one, backend="petsc")
+    finally:
+        for key in loose:
+            options.delValue(key)
+    assert result.outcome == ("identity_violated" if loose else "right")
+
+
+@pytest.mark.parametrize("n", [5, 16, 32])
+def test_a_uniform_temperature_stays(n: int) -> None:
+    """Nothing flows, so nothing but rounding is left to be compared with."""
+    keys = {
+        "supports__temperature": [],
+        "heat__source": 0.0,
+        "heat__heating__tensor": [[0.0, 0.0], [0.0, 0.0]],
+        "contact__heat_exchange__conductance": 0.0,
+        "initial__temperature": 3.0,
+    }
+    result = check(scene("isotropic", mesh__n=n, time__steps=3, **keys))
+    assert result.theta == pytest.approx(3.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -58,10 +58,11 @@ class Bookkeeper {
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, conducted_, exchanged_, contact_force_;  // B w, D theta, J theta, E lambda
-  std::vector<PetscInt> unknowns_;                               // of contact, relative to the owned range
-  std::vector<bool> clamped_, cooled_;                           // a node
-  Point<d> centroid_;                                            // moments are taken about it
+  VecHandle viscous_w_, conducted_, exchanged_, contact_force_;    // B w, D theta, J theta, E lambda
+  Eigen::VectorXd elastic_rows_, viscous_rows_, conduction_rows_;  // sums of |entries|, for what rounding explains
+  std::vector<PetscInt> unknowns_;                                 // of contact, relative to the owned range
+  std::vector<bool> clamped_, cooled_;                             // a node
+  Point<d> centroid_;                                              // moments are taken about it
 };
 
 }  // namespace warmslip

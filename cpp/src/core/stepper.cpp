@@ -132,6 +132,9 @@ bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& fr
   solution = contact_->solve(problem, guess);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
+  int converged = solution.converged;
+  MPI_Bcast(&converged, 1, MPI_INT, 0, layout_.comm());
+  solution.converged = converged != 0;
   cost_.newton_iterations += solution.iterations;
   cost_.dense_factorizations += solution.factorizations;
   return solution.converged;

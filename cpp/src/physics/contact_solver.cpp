@@ -20,13 +20,15 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
         std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
     fastest = std::max({fastest, problem.free.template segment<d>(at).norm(), velocity.template segment<d>(at).norm()});
     // the velocity is what the contact force leaves of the free one
+    const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
     const double terms =
-        point.displacement.norm() + std::abs(point.gap) +
-        problem.step * (velocity.template segment<d>(at).norm() + problem.free.template segment<d>(at).norm());
+        along(point.displacement) + std::abs(point.gap) +
+        problem.step * (along(velocity.template segment<d>(at)) + along(problem.free.template segment<d>(at)));
     rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
   }
   *floor = std::numeric_limits<double>::infinity();
-  if (!std::isfinite(largest) || !std::isfinite(fastest)) return std::numeric_limits<double>::infinity();
+  if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))
+    return std::numeric_limits<double>::infinity();
   if (largest <= rounding) {  // no contact force that rounding would let one tell from none: is that small?
     *floor = problem.scale > 0 ? rounding / problem.scale : 0;  // a body at rest has nothing to be compared with
     return 0;
