@@ -59,7 +59,7 @@ struct Paper {
   /// `refine`, every step gets the iterative refinement that only fine meshes need.
   Eigen::Vector4d run(int steps, Coupling coupling, Backend backend = Backend::automatic, bool refine = false) {
     StepperOptions options{1.0 / steps, coupling, backend, {}};
-    if (refine) options.refinement = 0;
+    if (refine) options.refinement = -1;
     Stepper<d> stepper(layout, problem, operators, surface, options);
     const Eigen::VectorXd gap = Eigen::VectorXd::Zero(surface.points());
     stepper.start(layout.vector(d), layout.vector(d), layout.vector(1), gap);
