@@ -14,7 +14,6 @@ from pydantic import ValidationError, model_validator
 
 from warmslip import tables as t
 
-
 SHORTEST = 1e-150  # step, time: its inverse is squared on the way
 
 

@@ -71,6 +71,7 @@ rule manufactured:
     params:
         levels=numbers(config["manufactured_levels"]),
         core=FINGERPRINT,
+        code=MEASURING,
     message:
         "errors on manufactured solutions"
     shell:
