@@ -221,8 +221,8 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
   const double bound = options_.identity_bound, floor = l.law_floor;
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.conducted + l.heat_change)) return Outcome::not_finite;
   if (!(floor <= options_.floor_bound)) return Outcome::precision_lost;
-  // the contact terms of the energy are evaluated by the law, with its rounding
-  const bool closed = l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound + floor &&
+  // the law's pressure, with its rounding, enters four terms of the energy: stored before and after, damping, friction
+  const bool closed = l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound + 4 * floor &&
                       l.law_residual <= bound + floor;
   return closed ? Outcome::right : Outcome::identity_violated;
 }
