@@ -89,7 +89,7 @@ def study(path: Path, expected: dict[str, Any]) -> list[Check]:
 
 
 def closed(cell: dict[str, Any]) -> bool:
-    """Whether a cell's books close to EXTREME; law and energy (the pressure enters four of its terms) beyond the floor that it states."""
+    """Whether a cell's books close to EXTREME; the law beyond its floor, the energy beyond that of its four contact terms."""
     floor = cell["law_floor"]
     allowed = {"heat": EXTREME, "force": EXTREME, "energy": EXTREME + 4 * floor, "law": EXTREME + floor}
     return all(cell[name] <= bound for name, bound in allowed.items())
