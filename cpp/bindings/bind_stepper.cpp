@@ -79,7 +79,8 @@ void bind_stepper(py::module_& m) {
       .value("contact_not_converged", Outcome::contact_not_converged)
       .value("not_finite", Outcome::not_finite)
       .value("identity_violated", Outcome::identity_violated)
-      .value("precision_lost", Outcome::precision_lost);
+      .value("precision_lost", Outcome::precision_lost)
+      .value("solver_failed", Outcome::solver_failed);
   py::enum_<Stage>(m, "Stage")
       .value("none", Stage::none)
       .value("newton", Stage::newton)

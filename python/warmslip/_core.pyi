@@ -698,6 +698,8 @@ class Outcome:
       identity_violated
     
       precision_lost
+    
+      solver_failed
     """
     __members__: typing.ClassVar[dict[str, Outcome]]
     contact_not_converged: typing.ClassVar[Outcome]
@@ -705,6 +707,7 @@ class Outcome:
     not_finite: typing.ClassVar[Outcome]
     precision_lost: typing.ClassVar[Outcome]
     right: typing.ClassVar[Outcome]
+    solver_failed: typing.ClassVar[Outcome]
     @typing.overload
     def __eq__(self, other: Outcome) -> bool:
         ...

@@ -162,7 +162,7 @@ def run(
 
     Collective over `comm` (default: all ranks). `progress(step, steps, report)` is called after every step on rank 0.
     A run that cannot go on returns normally: see `Result.outcome`, one of right, contact_not_converged, not_finite,
-    identity_violated and precision_lost; `failure` in the summary has the step that was not taken. Raises
+    identity_violated, precision_lost and solver_failed; `failure` in the summary has the step that was not taken. Raises
     ValueError for a scene or loads that make no sense, OSError when `out` cannot be written.
     """
     folder = Path(out) if out is not None else None

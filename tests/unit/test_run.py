@@ -150,6 +150,30 @@ def test_contact_that_does_not_converge_keeps_the_last_good_step(
         np.testing.assert_array_equal(t.u[-1], result.u)
 
 
+def test_a_linear_solver_that_fails_keeps_the_last_good_step(small: MakeScene) -> None:
+    """An iteration of one step serves a heat equation without sources, until they are switched on after two steps."""
+    from petsc4py import PETSc
+
+    options = {"heat_ksp_type": "cg", "heat_pc_type": "none", "heat_ksp_max_it": "1"}
+    for key, value in options.items():
+        PETSc.Options()[key] = value
+    try:
+        scene = small(time__steps=6, loads__traction={}, loads__body=[0.0, 0.0])
+        loads = replace(Loads.of(scene), source=lambda x, t: np.full(len(x), 1.0 if t > 0.4 else 0.0))
+        result = warmslip.run(scene, loads=loads, backend="petsc")
+    finally:
+        for key in options:
+            PETSc.Options().delValue(key)
+    assert (result.outcome, result.summary["steps"], result.summary["failure"]["step"]) == ("solver_failed", 2, 3)
+    assert not result.theta.any()
+
+
+def test_an_operator_without_inverse_is_refused(small: MakeScene) -> None:
+    """A stiffness beyond the numbers of the machine: one sentence with the cure instead of PETSc's error."""
+    with pytest.raises(ValueError, match=r"momentum operator could not be factored: .*; check the material"):
+        Run(small(elasticity__young=1e308, elasticity__poisson=0.9))
+
+
 def test_an_impossible_tolerance_is_an_outcome(small: MakeScene) -> None:
     d = discretise(small())
     report = d.stepper(tolerance=-1.0).advance(*d.load_vectors.at(0.25))

@@ -26,9 +26,11 @@ def _snakemake(tmp_path: Path) -> Snakemake:
         (tmp_path / name).symlink_to(ROOT / name)
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_"))}
 
-    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+    def call(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
         command = ["bash", "-c", '. workflows/env.sh && exec snakemake "$@"', "-", *arguments]
-        return subprocess.run(command, cwd=tmp_path, env=environment, text=True, capture_output=True, check=False)
+        return subprocess.run(
+            command, cwd=tmp_path, env=environment | more, text=True, capture_output=True, check=False
+        )
 
     return call
 
@@ -90,7 +92,8 @@ def test_schema_refuses(snakemake: Snakemake, tmp_path: Path, change: dict[str, 
 
 @pytest.mark.slow
 def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
-    """From nothing to verdict and report; then nothing is left to do, and a deleted figure comes back alone."""
+    """From nothing to verdict and report; then nothing is left to do; a deleted figure comes back alone, a changed core
+    solves anew."""
     small = ("--configfile", CI)
     first = snakemake(*small)
     assert first.returncode == 0, first.stdout + first.stderr
@@ -107,6 +110,15 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     (paper / "figures/figure_5_printed.png").unlink()
     assert plan(snakemake("--dry-run", "--quiet", "rules", *small)) == {"figure_5": 1, "all": 1}
     assert snakemake(*small).returncode == 0
+
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/sitecustomize.py").write_text(
+        "import warmslip.provenance\nwarmslip.provenance.fingerprint = lambda: 'another core'\n"
+    )
+    other = plan(snakemake("--dry-run", "--quiet", "rules", *small, PYTHONPATH=str(tmp_path / "other")))
+    everything = plan(snakemake("--dry-run", "--quiet", "rules", "--forceall", *small))
+    solves = ("study", "run", "manufactured", "extremes")
+    assert {rule: other.get(rule) for rule in solves} == {rule: everything[rule] for rule in solves}
 
     report = snakemake("--report", "report.html", *small)
     assert report.returncode == 0, report.stderr

@@ -16,6 +16,11 @@ struct PetscFailure : std::runtime_error {
   int code;
 };
 
+/// A linear solve that did not reach its answer; the message is a sentence with the cure.
+struct SolveFailed : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Throws PetscFailure unless `error` is success.
 void check(PetscErrorCode error, const char* where);
 #define WARMSLIP_PETSC(call) ::warmslip::check((call), #call)

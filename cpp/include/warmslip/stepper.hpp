@@ -10,8 +10,8 @@ namespace warmslip {
 enum class Coupling { staggered, lagged, monolithic };
 
 /// `precision_lost`: the stiffness is so large that rounding of the displacement hides the pressure, see
-/// Ledger::law_floor.
-enum class Outcome { right, contact_not_converged, not_finite, identity_violated, precision_lost };
+/// Ledger::law_floor. `solver_failed`: a linear solve did not reach its answer (iterative ones, by PETSc's options).
+enum class Outcome { right, contact_not_converged, not_finite, identity_violated, precision_lost, solver_failed };
 
 struct StepperOptions {
   double k;  ///< time step
@@ -74,6 +74,7 @@ class Stepper {
   std::string solver() const;
 
  private:
+  StepReport<d> attempt(const StepLoads& loads);
   void momentum_right_side(const StepLoads& loads, Vec out);
   void products(Level& level) const;
   bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,

@@ -5,7 +5,8 @@ namespace {
 
 class PetscFactor final : public Factor {
  public:
-  PetscFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix) {
+  PetscFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix)
+      : prefix_(prefix) {
     const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(k));
     const bool cholesky = symmetry == Symmetry::positive_definite;
     WARMSLIP_PETSC(KSPCreate(comm, ksp_.out()));
@@ -19,8 +20,11 @@ class PetscFactor final : public Factor {
     WARMSLIP_PETSC(PCSetType(pc, cholesky ? PCCHOLESKY : PCLU));
     WARMSLIP_PETSC(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
     WARMSLIP_PETSC(KSPSetFromOptions(ksp_));
-    WARMSLIP_PETSC(KSPSetErrorIfNotConverged(ksp_, PETSC_TRUE));
     WARMSLIP_PETSC(KSPSetUp(ksp_));
+    if (reason() < 0)
+      throw std::invalid_argument("the " + prefix +
+                                  " operator could not be factored: it is singular or its entries "
+                                  "are out of range; check the material, the supports and the time step");
     WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
     work_ = duplicate(right_);
 
@@ -33,8 +37,7 @@ class PetscFactor final : public Factor {
 
   Eigen::VectorXd reduce(Vec r) override {
     WARMSLIP_PETSC(VecCopy(r, right_));
-    WARMSLIP_PETSC(KSPSolve(ksp_, right_, free_));
-    ++substitutions_;
+    solve_for(right_, free_);
     return held(free_);
   }
 
@@ -44,8 +47,7 @@ class PetscFactor final : public Factor {
       return;
     }
     add_load(load);
-    WARMSLIP_PETSC(KSPSolve(ksp_, work_, x));
-    ++substitutions_;
+    solve_for(work_, x);
     WARMSLIP_PETSC(VecAYPX(x, -1, free_));
   }
 
@@ -56,8 +58,7 @@ class PetscFactor final : public Factor {
     const VecHandle column = duplicate(free_);
     for (Eigen::Index j = 0; j < n; ++j) {
       add_load(Eigen::VectorXd::Unit(n, j));
-      WARMSLIP_PETSC(KSPSolve(ksp_, work_, column));
-      ++substitutions_;
+      solve_for(work_, column);
       compliance_.col(j) = held(column);
     }
     return compliance_;
@@ -85,6 +86,20 @@ class PetscFactor final : public Factor {
   }
 
  private:
+  int reason() const {
+    KSPConvergedReason reason;
+    WARMSLIP_PETSC(KSPGetConvergedReason(ksp_, &reason));
+    return reason;
+  }
+
+  void solve_for(Vec right, Vec x) {
+    WARMSLIP_PETSC(KSPSolve(ksp_, right, x));
+    ++substitutions_;
+    if (reason() < 0)
+      throw SolveFailed("the " + prefix_ + " solver ended with " + KSPConvergedReasons[reason()] +
+                        "; change the PETSc options that start with " + prefix_ + "_");
+  }
+
   // a direct solver, unless the options say otherwise
   bool direct() const {
     PC pc;
@@ -111,6 +126,7 @@ class PetscFactor final : public Factor {
         (*values)[trailing_[i] - begin] = load[static_cast<Eigen::Index>(i)];
   }
 
+  std::string prefix_;
   KspHandle ksp_;
   VecHandle right_, free_, work_, held_;
   IsHandle indices_;

@@ -229,6 +229,17 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
 
 template <int d>
 StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
+  try {
+    return attempt(loads);
+  } catch (const SolveFailed&) {  // on all ranks alike
+    StepReport<d> report;
+    report.outcome = Outcome::solver_failed;
+    return report;
+  }
+}
+
+template <int d>
+StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   if (loads.gap.size() != surface_.points()) throw std::invalid_argument("the gap needs one value a contact point");
   const Timed timed(cost_.step_seconds);
   const bool monolithic = options_.coupling == Coupling::monolithic;
