@@ -34,7 +34,7 @@ struct Body {
 template <int d>
 Body<d> random_body(unsigned seed, int points, double friction, double stiffness = 100) {
   Random random(seed);
-  const Eigen::Index n = points * d;
+  const Eigen::Index n = Eigen::Index{points} * d;
   Eigen::MatrixXd root(n, n);
   for (double& entry : root.reshaped()) entry = random();
   Body<d> body{root * root.transpose() / n + Eigen::MatrixXd::Identity(n, n),
@@ -174,7 +174,7 @@ TEST_CASE_TEMPLATE("failure is said and never thrown", D, Two, Three) {
   constexpr int d = D::value;
   Body<d> body = random_body<d>(7, 4, 0.3);
   for (auto& point : body.problem.points) point.penetration = 1;
-  const Eigen::VectorXd guess = Eigen::VectorXd::Zero(4 * d);
+  const Eigen::VectorXd guess = Eigen::VectorXd::Zero(body.compliance.rows());
   const auto nothing = ContactSolver<d>(body.compliance, only(0, 0, 0)).solve(body.problem, guess);
   CHECK_FALSE(nothing.converged);
   CHECK(nothing.law_residual > 1e-3);

@@ -34,7 +34,8 @@ Sparse grid_matrix(int n, int block, bool indefinite) {
     for (int i = 0; i < block; ++i)
       entries.emplace_back(node * block + i, node * block + i, indefinite && i == block - 1 ? -12 * block : 12 * block);
   }
-  Sparse a(n * n * block, n * n * block);
+  const Eigen::Index size = Eigen::Index{n} * n * block;
+  Sparse a(size, size);
   a.setFromTriplets(entries.begin(), entries.end());
   return a;
 }

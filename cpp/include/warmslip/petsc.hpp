@@ -55,6 +55,9 @@ using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
 /// A copy of the layout of `like`, not of its values.
 VecHandle duplicate(Vec like);
 
+/// Unknowns a node.
+Eigen::Index block_size(Vec v);
+
 /// A view of a vector's own entries as an Eigen array, for reading or writing; returned to PETSc on destruction.
 class Values {
  public:

@@ -177,10 +177,10 @@ class CholmodFactor final : public Factor {
   void last_block() {
     last_ = Eigen::MatrixXd::Identity(held_, held_);
     pivots_.resize(held_);
-    const int* start = static_cast<const int*>(factor_->p);
-    const int* count = static_cast<const int*>(factor_->nz);
-    const int* index = static_cast<const int*>(factor_->i);
-    const double* value = static_cast<const double*>(factor_->x);
+    const auto* start = static_cast<const int*>(factor_->p);
+    const auto* count = static_cast<const int*>(factor_->nz);
+    const auto* index = static_cast<const int*>(factor_->i);
+    const auto* value = static_cast<const double*>(factor_->x);
     for (Eigen::Index j = 0; j < held_; ++j) {
       const auto column = interior_ + j;
       for (int e = start[column]; e < start[column] + count[column]; ++e) {
@@ -198,7 +198,7 @@ class CholmodFactor final : public Factor {
     WARMSLIP_PETSC(MatCreateVecs(k, x.out(), b.out()));
     {
       Values values(b);
-      for (Eigen::Index i = 0; i < (*values).size(); ++i) (*values)[i] = 1 + (i * 7 % 11);
+      for (Eigen::Index i = 0; i < (*values).size(); ++i) (*values)[i] = static_cast<double>(1 + i * 7 % 11);
     }
     const VecHandle residual = duplicate(b);
     reduce(b);

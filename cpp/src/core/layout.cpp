@@ -234,8 +234,7 @@ Eigen::VectorXd Layout<d>::local(Vec v) const {
 
 template <int d>
 Eigen::VectorXd Layout<d>::gather(Vec v) const {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::Index block = block_size(v);
   Eigen::VectorXd all = Eigen::VectorXd::Zero(mesh_->nodes.rows() * block);
   {
     Values own(v);
@@ -247,8 +246,7 @@ Eigen::VectorXd Layout<d>::gather(Vec v) const {
 
 template <int d>
 void Layout<d>::distribute(const Eigen::VectorXd& values, Vec v) const {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::Index block = block_size(v);
   if (values.size() != mesh_->nodes.rows() * block)
     throw std::invalid_argument("expected " + std::to_string(block) + " values for each of the " +
                                 std::to_string(mesh_->nodes.rows()) + " nodes, got " + std::to_string(values.size()) +

@@ -48,8 +48,8 @@ VecHandle LoadQuadrature<d>::load(const RealTable<Eigen::Dynamic>& values) const
   if (values.rows() != positions_.rows())
     throw std::invalid_argument("a load needs one row for each of the " + std::to_string(positions_.rows()) +
                                 " quadrature points, got " + std::to_string(values.rows()));
-  const int block = static_cast<int>(values.cols());
-  VecHandle v = layout_.vector(block);
+  const Eigen::Index block = values.cols();
+  VecHandle v = layout_.vector(static_cast<int>(block));
   const Eigen::Index per = rule_.weights.size();
   Vec form;
   WARMSLIP_PETSC(VecGhostGetLocalForm(v, &form));
@@ -69,8 +69,7 @@ VecHandle LoadQuadrature<d>::load(const RealTable<Eigen::Dynamic>& values) const
 
 template <int d>
 void LoadQuadrature<d>::expect(const RealTable<Eigen::Dynamic>& values, Vec field, Eigen::Index components) const {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(field, &block));
+  const Eigen::Index block = block_size(field);
   if (values.rows() != positions_.rows() || block != components)
     throw std::invalid_argument("expected one row for each of the " + std::to_string(positions_.rows()) +
                                 " quadrature points and a field of " + std::to_string(components) +
@@ -81,7 +80,7 @@ template <int d>
 double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
   expect(values, field, values.cols());
   const Eigen::VectorXd local = layout_.local(field);
-  const auto block = static_cast<int>(values.cols());
+  const Eigen::Index block = values.cols();
   const Eigen::Index per = rule_.weights.size();
   double total = 0;
   for (Eigen::Index s = 0; s < nodes_.rows(); ++s)
@@ -97,7 +96,7 @@ double LoadQuadrature<d>::squared_distance(Vec field, const RealTable<Eigen::Dyn
 template <int d>
 double LoadQuadrature<d>::squared_strain_distance(Vec field, const RealTable<Eigen::Dynamic>& values) const {
   expect(values, field, d);
-  if (values.cols() != d * d)
+  if (values.cols() != Eigen::Index{d} * d)
     throw std::invalid_argument("gradients need " + std::to_string(d * d) + " columns, got " +
                                 std::to_string(values.cols()));
   const Eigen::VectorXd local = layout_.local(field);
@@ -140,8 +139,7 @@ double Norms<d>::squared_l2(const Eigen::VectorXd& local) const {
 
 template <int d>
 double Norms<d>::l2(Vec v) const {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::Index block = block_size(v);
   if (block != 1 && block != d)
     throw std::invalid_argument("an L2 norm is for scalars and for vectors of the space's dimension");
   const Eigen::VectorXd local = layout_.local(v);
@@ -150,8 +148,7 @@ double Norms<d>::l2(Vec v) const {
 
 template <int d>
 double Norms<d>::v(Vec v) const {
-  PetscInt block;
-  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  const Eigen::Index block = block_size(v);
   if (block != d)
     throw std::invalid_argument("|.|_V is a norm of displacements, with " + std::to_string(d) + " components a node");
   const Eigen::VectorXd local = layout_.local(v);

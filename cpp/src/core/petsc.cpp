@@ -16,6 +16,12 @@ VecHandle duplicate(Vec like) {
   return v;
 }
 
+Eigen::Index block_size(Vec v) {
+  PetscInt block;
+  WARMSLIP_PETSC(VecGetBlockSize(v, &block));
+  return block;
+}
+
 Values::Values(Vec vec) : vec_(vec) {
   WARMSLIP_PETSC(VecGetLocalSize(vec, &size_));
   WARMSLIP_PETSC(VecGetArray(vec, &data_));

@@ -52,7 +52,7 @@ std::vector<std::array<int, d + 1>> kuhn_simplices() {
   do {
     std::array<int, d + 1> corners{};
     for (int i = 0; i < d; ++i)
-      corners[static_cast<std::size_t>(i + 1)] =
+      corners[static_cast<std::size_t>(i) + 1] =
           corners[static_cast<std::size_t>(i)] | (1 << order[static_cast<std::size_t>(i)]);
     int inversions = 0;
     for (int i = 0; i < d; ++i)

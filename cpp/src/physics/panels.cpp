@@ -90,20 +90,22 @@ WARMSLIP_WIDE void Panels::forward(double* x) const {
 
 WARMSLIP_WIDE void Panels::backward(double* x) const {
   double* t = work_.data();
-  for (auto p = panels_.rbegin(); p != panels_.rend(); ++p) {
-    const std::size_t triangle = static_cast<std::size_t>(p->width) * static_cast<std::size_t>(p->width - 1) / 2;
-    const double* a = values_.data() + p->value + triangle;
-    const int* rows = rows_.data() + p->row;
-    double* own = x + p->first;
-    for (int i = 0; i < p->rows; ++i) t[i] = x[rows[i]];
-    for (int j = 0; j < p->width; ++j) {
-      own[j] = own[j] * inverse_pivots_[static_cast<std::size_t>(p->first + j)] - dot(a, t, p->rows);
-      a += p->rows;
+  for (std::size_t at = panels_.size(); at-- > 0;) {
+    const Panel& p = panels_[at];
+    const auto width = static_cast<std::size_t>(p.width), triangle = width * (width - 1) / 2;
+    const double* inverse_pivots = inverse_pivots_.data() + p.first;
+    const double* a = values_.data() + p.value + triangle;
+    const int* rows = rows_.data() + p.row;
+    double* own = x + p.first;
+    for (int i = 0; i < p.rows; ++i) t[i] = x[rows[i]];
+    for (int j = 0; j < p.width; ++j) {
+      own[j] = own[j] * inverse_pivots[j] - dot(a, t, p.rows);
+      a += p.rows;
     }
-    a = values_.data() + p->value + triangle;
-    for (int j = p->width - 2; j >= 0; --j) {
-      a -= p->width - 1 - j;
-      own[j] -= dot(a, own + j + 1, p->width - 1 - j);
+    a = values_.data() + p.value + triangle;
+    for (int j = p.width - 2; j >= 0; --j) {
+      a -= p.width - 1 - j;
+      own[j] -= dot(a, own + j + 1, p.width - 1 - j);
     }
   }
 }
