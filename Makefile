@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify asan bench mutants lint
+.PHONY: help setup reproduce test verify coverage asan bench mutants lint
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -20,13 +20,16 @@ test:  ## all C++ and Python tests (ARGS go to pytest)
 verify: setup  ## every proof of the numbers into results/verification (ARGS go to snakemake)
 	@$(env) snakemake -s workflows/verify/Snakefile --quiet host reason $(ARGS)
 
+coverage: setup  ## lines and branches of the C++ core that the fast tests reach (ARGS go to pytest)
+	@bash tests/coverage.sh $(ARGS)
+
 asan: setup  ## the C++ tests under the address and undefined behaviour sanitizers
 	@$(env) cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
 
 bench: setup  ## the benchmarks alone (ARGS go to pytest)
 	@$(env) python -m pytest -o addopts="--import-mode=importlib" --benchmark-only $(ARGS) tests/benchmarks
 
-mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --every, --out FILE)
+mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --handful N, --every, --out FILE)
 	@$(env) python tests/mutants/run.py $(ARGS)
 
 lint: setup  ## format, style, types and layers

@@ -69,12 +69,14 @@ def report(
     tables: Annotated[list[Path], typer.Argument(help="lines written by `warmslip verify`")],
     out: Annotated[Path, typer.Option(help="the Markdown file to write")],
     figures: Annotated[list[Path] | None, typer.Option(help="a figure to show, any number of times")] = None,
+    audits: Annotated[list[Path] | None, typer.Option(help="written by `warmslip check`, any number of times")] = None,
+    faults: Annotated[Path | None, typer.Option(help="written by `make mutants`")] = None,
     fail: Annotated[bool, typer.Option(help="exit 1 when a line is out of its band")] = True,
 ) -> None:
     """Put the lines of all topics into one report."""
     from warmslip.verify import report as writing
 
-    text, passed = writing.markdown(tables, figures or [])
+    text, passed = writing.markdown(tables, figures or [], audits or [], faults)
     out.write_text(text)
     typer.echo(f"{'passed' if passed else 'FAILED'}: read {out}")
     if fail and not passed:

@@ -29,10 +29,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 # fast and near the mathematics first; -x stops at the first that fails
 SUITE = ["tests/verification", "tests/unit", "-m", "not slow", "--deselect", "tests/unit/test_public_files.py"]
-# the tree's own package in place of the installed one, in every process the tests start
-SHADOW = """import sys
-sys.meta_path[:] = [f for f in sys.meta_path if "editable" not in type(f).__module__.lower()]
-"""
+TABLE = ROOT / "results/verification/mutants.csv"
+CORES = os.cpu_count() or 1
 
 
 class Fault(NamedTuple):
@@ -65,8 +63,8 @@ def faults() -> list[Fault]:
 class Tree:
     """A copy of the tracked files with a build of its own; one that is there already is brought up to date."""
 
-    def __init__(self, at: Path) -> None:
-        self.at = at
+    def __init__(self, at: Path, cores: int) -> None:
+        self.at, self.cores = at, cores
         tracked = subprocess.run(
             ["git", "ls-files", "-coz", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
         )
@@ -77,8 +75,6 @@ class Tree:
             if not copy.exists() or copy.read_bytes() != source.read_bytes():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source, copy)
-        (at / "shadow").mkdir(exist_ok=True)
-        (at / "shadow/sitecustomize.py").write_text(SHADOW)
         pybind = self._run(sys.executable, "-m", "pybind11", "--cmakedir").stdout.strip()
         self._run(
             *("cmake", "-S", ".", "-B", "build/tests", "-G", "Ninja", "-DWARMSLIP_PYTHON=ON", "-DWARMSLIP_TESTS=ON"),
@@ -87,12 +83,13 @@ class Tree:
         ).check_returncode()
 
     def _run(self, *command: str) -> subprocess.CompletedProcess[str]:
-        environment = os.environ | {"PYTHONPATH": f"{self.at / 'shadow'}:{self.at / 'python'}"}
+        # the tree's own package in place of the installed one, in every process the tests start
+        environment = os.environ | {"PYTHONPATH": f"{self.at / 'tests/shadow'}:{self.at / 'python'}"}
         return subprocess.run(command, cwd=self.at, env=environment, capture_output=True, text=True, check=False)
 
     def build(self) -> str:
         """Compiles; the compiler's first error, or nothing."""
-        result = self._run("cmake", "--build", "build/tests", "-j1")
+        result = self._run("cmake", "--build", "build/tests", f"-j{self.cores}")
         for core in (self.at / "build/tests").glob("_core.*.so"):
             shutil.copy2(core, self.at / "python/warmslip" / core.name)
         error = re.search(r"error: .*", result.stdout + result.stderr)
@@ -149,13 +146,18 @@ class Tree:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help="faults to try (default: all)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="trees at work at once")
+    parser.add_argument("--handful", type=int, help="so many, others after every commit; the tests are taken to pass")
+    parser.add_argument("--jobs", type=int, default=CORES, help="trees at work at once")
     parser.add_argument("--every", action="store_true", help="run all tests, not only up to the first that fails")
     parser.add_argument("--workflow", action="store_true", help="run the small workflow as well, for its verdict")
     parser.add_argument("--trees", type=Path, help="where to keep the built trees for the next time (default: nowhere)")
-    parser.add_argument("--out", type=Path, help="a CSV of what was found")
+    parser.add_argument("--out", type=Path, help=f"a CSV of what was found (all: {TABLE.relative_to(ROOT)})")
     options = parser.parse_args()
     chosen = [f for f in faults() if not options.names or f.name in options.names]
+    if options.handful:
+        chosen = handful(chosen, options.handful)
+    elif not options.names:
+        options.out = options.out or TABLE
     if unknown := set(options.names) - {f.name for f in chosen}:
         parser.error(f"unknown faults: {', '.join(sorted(unknown))}")
 
@@ -165,8 +167,9 @@ def main() -> int:
         trees: Queue[Tree] = Queue()
 
         def ready(number: int) -> None:
-            tree = Tree((options.trees or Path(folder)) / str(number))
-            wrong = tree.build() or "; ".join(tree.failures(every=False) if number == 0 else [])
+            tree = Tree((options.trees or Path(folder)) / str(number), max(1, CORES // jobs))
+            untested = number == 0 and not options.handful
+            wrong = tree.build() or "; ".join(tree.failures(every=False) if untested else [])
             if wrong:
                 raise SystemExit(f"the tests must pass before faults are seeded: {wrong}")
             trees.put(tree)
@@ -191,17 +194,27 @@ def main() -> int:
     return report(table, options.out)
 
 
+def handful(all_: list[Fault], count: int) -> list[Fault]:
+    """`count` faults spread over the list, moved on by one with every commit."""
+    commits = subprocess.run(["git", "rev-list", "--count", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
+    stride = max(1, len(all_) // count)
+    return all_[int(commits or 0) % stride :: stride][:count]
+
+
 def report(table: list[Found], out: Path | None) -> int:
     """Writes the table; 0 when every fault compiles and is killed, or is known to change nothing."""
     if out:
         out.parent.mkdir(parents=True, exist_ok=True)
         with out.open("w", newline="") as file:
-            lines = csv.writer(file)
-            lines.writerow(["fault", "file", "what", "outcome", "killed by, or why not"])
+            lines = csv.writer(file, lineterminator="\n")
+            lines.writerow(["fault", "file", "what", "outcome", "by"])
             lines.writerows([f.fault.name, f.fault.file, f.fault.what, f.outcome, f.by] for f in table)
     bad = [f.fault.name for f in table if f.outcome != "killed" and not (f.outcome == "survived" and f.fault.survives)]
     killed = sum(f.outcome == "killed" for f in table)
-    print(f"{killed} of {len(table)} killed" + (f"; not explained: {', '.join(bad)}" if bad else ""))
+    print(
+        f"{killed} of {len(table)} killed ({100 * killed / len(table):.1f} %)"
+        + (f"; not explained: {', '.join(bad)}" if bad else "")
+    )
     return 1 if bad else 0
 
 

@@ -56,3 +56,25 @@ def test_a_topic_without_lines_proves_nothing(tmp_path: Path) -> None:
 
 def test_every_topic_says_what_it_is() -> None:
     assert all(run.__doc__ for run in topics.TOPICS.values())
+
+
+def test_audits_and_faults_are_told(tmp_path: Path) -> None:
+    line.write(tmp_path / "good.csv", [one()], {"title": "What is good"})
+    for name, holds, value in (("soft", "no", "0"), ("stiff", "yes", "12.345678")):
+        (tmp_path / f"audit_{name}.csv").write_text(
+            f"topic,statement,values,holds,meaning\n(H1),m > 0,m_b = {value}; M_b = inf,{holds},so it is\n"
+        )
+    (tmp_path / "mutants.csv").write_text(
+        "fault,file,what,outcome,by\n"
+        "sign,a.cpp,wrong sign,killed,unit/test_run.py::test_signs[x]\n"
+        "slow,a.cpp,a slower path,survived,the same answer\n"
+        "new,a.cpp,nobody knows,survived,\n"
+    )
+    audits = [tmp_path / "audit_soft.csv", tmp_path / "audit_stiff.csv"]
+    text, passed = report.markdown([tmp_path / "good.csv"], [], audits, tmp_path / "mutants.csv")
+    assert passed
+    assert "| (H1) | m > 0 | **no** m_b = 0, M_b = inf | **yes** m_b = 12.35, M_b = inf |" in text
+    assert "**1 of 3 killed (33.3 %)**" in text
+    assert "| unit/test_run.py | 1 |" in text
+    assert "| slow | a slower path | the same answer |" in text
+    assert "| new | nobody knows | **unexplained** |" in text

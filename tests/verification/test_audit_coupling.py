@@ -22,6 +22,7 @@ from warmslip.verify.audit_coupling import (
     staggered_limit,
 )
 from warmslip.verify.audit_report import Finding, find
+from warmslip.verify.audit_runs import energy
 from warmslip.verify.closed import bench
 
 
@@ -104,17 +105,6 @@ def test_paper_scene_with_opposite_coupling_beyond_the_limit() -> None:
     said, big = energies(60.0)
     assert said.holds == "no"
     assert big[-1] > 1e3 * big[0]
-
-
-def energy(job: Run, g: float) -> float:
-    """rho |w|^2/2 + a(u,u)/2 + Phi + g |theta|^2/2 of a state; nodal contact."""
-    d, s = job.discretisation, job.stepper
-    product = lambda matrix, v: float(v.dot(matrix * v))  # noqa: E731
-    ops = d.operators
-    penetration = np.maximum(np.asarray(s.contact_displacement).reshape(-1, d.dim) @ np.array([0.0, -1.0]), 0)
-    stored = d.scene.contact.stiffness * float(np.asarray(d.surface.weights) @ penetration**2)
-    kinetic = d.scene.inertia.density * d.norms.l2(s.w) ** 2
-    return (kinetic + product(ops.elasticity, s.u) + stored + g * product(ops.mass, s.theta)) / 2
 
 
 def test_staggered_limit_by_hand() -> None:

@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import warmslip
 from warmslip import Scene, judge, manufactured
-from warmslip.errors import TERMS
+from warmslip.errors import TERMS, Comparison, Largest
+from warmslip.problem import discretise
 
 LEVELS, FINE = [8, 16, 32], [16, 32, 64]
 STORED = {
@@ -63,6 +65,26 @@ def test_orders(tmp_path: Path, path: str) -> None:
         if name in found:
             assert found[name].value == pytest.approx(value, rel=1e-8)
     assert {"contact_open": rows[-1]["open"], "stick": rows[-1]["stick"]} == {"contact_open": 0, "stick": 0}
+
+
+@pytest.mark.parametrize("path", ["h=k", "k=h^2"])
+def test_algebraic_errors_are_invisible(path: str) -> None:
+    """Two linear solvers and a contact tolerance two digits apart give answers whose distance is no part of the error."""
+    n, steps = manufactured.grid(path, LEVELS if path == "h=k" else FINE)[-1]
+    scene = PAPER.override(**{"mesh.n": n, "time.steps": steps})
+    solution = manufactured.slipping(scene)
+    d = discretise(scene, loads=solution.loads)
+    nodes = np.asarray(d.mesh.nodes)
+    steppers = [d.stepper(), d.stepper(backend="petsc", tolerance=1e-10)]
+    distance = Largest()
+    for one in steppers:
+        d.restart(one, solution.u(nodes, 0.0), solution.w(nodes, 0.0), solution.theta(nodes, 0.0), 0.0)
+    for step in range(1, steps + 1):
+        loads = d.load_vectors.at(step * scene.step)
+        assert all(one.advance(*loads).outcome.name == "right" for one in steppers)
+        distance.add(Comparison(d, d).difference(*steppers))
+    for term in TERMS:
+        assert distance.values[term] <= 1e-6 * STORED[f"manufactured {path} staggered {term} finest"], term
 
 
 @pytest.mark.parametrize("coupling", ["lagged", "monolithic"])

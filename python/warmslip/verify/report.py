@@ -1,10 +1,11 @@
-"""The verification report: every line of every topic in one table, in Markdown, with the figures beside it."""
+"""The verification report in Markdown: figures, audits, seeded faults, and every line of every topic."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 HEAD = """# Verification
@@ -32,19 +33,60 @@ def read(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def markdown(tables: Sequence[Path], figures: Sequence[Path]) -> tuple[str, bool]:
+def row(*cells: str) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
+
+
+def audits(paths: Sequence[Path]) -> Iterator[str]:
+    """What the theory assumes, a line a statement and a column a data set: whether it holds, and the numbers."""
+    names = [path.stem.removeprefix("audit_") for path in paths]
+    found = {
+        name: {(r["topic"], r["statement"]): r for r in read(path)} for name, path in zip(names, paths, strict=True)
+    }
+    yield "\n## audits\n\nWhat the theory assumes, on the paper's data sets with the hot foundation (`warmslip check SCENE`). "
+    yield "What each answer means is in "
+    yield ", ".join(f"[{path.name}]({path.name})" for path in paths)
+    yield "; the topic `audited` puts to a run what a run can contradict.\n\n"
+    yield row("what", "statement", *names) + "| --- " * (2 + len(names)) + "|\n"
+    for topic, statement in dict.fromkeys(key for own in found.values() for key in own):
+        cells = []
+        for name in names:
+            one = found[name].get((topic, statement))
+            pairs = [pair.split(" = ") for pair in one["values"].split("; ") if pair] if one else []
+            numbers = ", ".join(f"{key} = {number(value)}" for key, value in pairs)
+            cells.append(f"**{one['holds']}** {numbers}" if one else "")
+        yield row(topic, statement, *cells)
+
+
+def faults(path: Path) -> Iterator[str]:
+    """The score of the seeded faults, what kills most of them, and every survivor with the reason."""
+    table = read(path)
+    killers = Counter(r["by"].split("::")[0].split("[")[0] for r in table if r["outcome"] == "killed")
+    killed, survivors = killers.total(), [r for r in table if r["outcome"] != "killed"]
+    yield f"\n## seeded faults\n\n**{killed} of {len(table)} killed ({100 * killed / len(table):.1f} %)** by the fast tests "
+    yield f"(`make mutants`); which check kills which fault is in [{path.name}]({path.name}).\n\n"
+    yield row("first to fail", "faults") + "| --- | --- |\n"
+    yield from (row(name, str(count)) for name, count in killers.most_common())
+    if survivors:
+        yield "\n" + row("survivor", "what it does", "why no check can fail") + "| --- | --- | --- |\n"
+        yield from (row(r["fault"], r["what"], r["by"] or "**unexplained**") for r in survivors)
+
+
+def markdown(
+    tables: Sequence[Path], figures: Sequence[Path], audited: Sequence[Path] = (), seeded: Path | None = None
+) -> tuple[str, bool]:
     """The report and whether all lines passed; titles come from the stamps. Raises ValueError for a table without lines."""
     topics = {path.stem: read(path) for path in tables}
     titles = {path.stem: json.loads(path.with_suffix(".json").read_text())["title"] for path in tables}
     empty = [name for name, rows in topics.items() if not rows]
     if empty:
         raise ValueError(f"no lines in {', '.join(empty)}: a verification that checks nothing proves nothing")
-    failed = {name: sum(row["verdict"] != "pass" for row in rows) for name, rows in topics.items()}
+    failed = {name: sum(one["verdict"] != "pass" for one in rows) for name, rows in topics.items()}
     total, wrong = sum(map(len, topics.values())), sum(failed.values())
     origins: dict[str, int] = {}
     for rows in topics.values():
-        for row in rows:
-            origins[row["origin"]] = origins.get(row["origin"], 0) + 1
+        for one in rows:
+            origins[one["origin"]] = origins.get(one["origin"], 0) + 1
     counts = ", ".join(f"{count} {origin}" for origin, count in sorted(origins.items(), key=lambda item: -item[1]))
     summary = f"**{total - wrong} of {total} lines pass.** Where the expected numbers come from: {counts}."
     out = [HEAD.format(summary=summary)]
@@ -55,20 +97,24 @@ def markdown(tables: Sequence[Path], figures: Sequence[Path]) -> tuple[str, bool
     for figure in figures:
         caption = figure.with_suffix(".rst")
         out.append(f"\n![{figure.stem}]({figure.name})\n\n{caption.read_text().strip() if caption.exists() else ''}\n")
+    if audited:
+        out += audits(audited)
+    if seeded:
+        out += faults(seeded)
     for name, rows in topics.items():
         out.append(f"\n## {name}\n\n{titles[name]}\n\n")
         out.append(
             "| case | what it proves | origin | expected | observed | band | |\n| --- | --- | --- | --- | --- | --- | --- |\n"
         )
-        for row in rows:
+        for one in rows:
             cells = (
-                row["case"],
-                row["proves"],
-                row["origin"],
-                number(row["expected"]),
-                number(row["observed"]),
-                band(row["low"], row["high"]),
-                "" if row["verdict"] == "pass" else "**FAIL**",
+                one["case"],
+                one["proves"],
+                one["origin"],
+                number(one["expected"]),
+                number(one["observed"]),
+                band(one["low"], one["high"]),
+                "" if one["verdict"] == "pass" else "**FAIL**",
             )
-            out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n")
+            out.append(row(*cells))
     return "".join(out), wrong == 0

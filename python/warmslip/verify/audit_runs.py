@@ -1,0 +1,124 @@
+"""What the audit says of the paper's data sets, against runs: each claim that a run can contradict is put to one.
+
+Energy that must not grow is watched without loads; a step that has one answer is solved from another start by another method;
+orders that are entitled are measured between successive grids. |u_h - u_h/2| is C h^p (1 - 2^-p) for an error C h^p, so
+their ratio has no bias: no solution stands in for the exact one. Numbers are dimensionless.
+
+|w|_L2 is left out for the cold foundation: its error is that of a layer of width sqrt(mu_1 k) at the start, which is as wide as
+the body on these grids (0.28 for k = 1/128), so that no order can be seen yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+import warmslip
+from warmslip import _core
+from warmslip.problem import discretise
+from warmslip.rates import entitled, observed
+from warmslip.runner import Run
+from warmslip.scene import Scene
+from warmslip.study import study
+from warmslip.verify.audit import examine
+from warmslip.verify.audit_coupling import mandel_vector
+from warmslip.verify.audit_report import Finding, find
+from warmslip.verify.line import Line, below, order
+
+READINGS = ("printed", "mixed", "isotropic", "consistent")
+HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
+ROUNDING = 1e-12  # of the energy at the start
+AGREEMENT = 1e-7  # of two answers of one step whose laws are met to 1e-10
+LEVELS = (64, 128)  # each against its double
+TERMS = {0.0: ("u_V", "theta_L2"), 10.0: ("u_V", "w_L2", "theta_L2")}  # by theta_F
+
+
+def energy(job: Run, g: float) -> float:
+    """rho |w|^2/2 + a(u,u)/2 + Phi + g |theta|^2/2 of a state under nodal contact, energy; `g` as in `audit_coupling`."""
+    d, s = job.discretisation, job.stepper
+    normals = np.asarray(d.surface.normals)
+    displacement = np.asarray(s.contact_displacement).reshape(normals.shape)
+    penetration = np.maximum(np.sum(displacement * normals, axis=1) - d.scene.contact.gap, 0)
+    contact = d.scene.contact.stiffness * float(np.asarray(d.surface.weights) @ penetration**2)
+    kinetic = d.scene.inertia.density * d.norms.l2(s.w) ** 2
+    elastic = float(s.u.dot(d.operators.elasticity * s.u))
+    return float(kinetic + elastic + contact + g * d.norms.l2(s.theta) ** 2) / 2
+
+
+def heat_weight(scene: Scene) -> float:
+    """g = |M|/|R| in the metric of the inverse viscosity: how the audit weighs heat against motion."""
+    material = discretise(scene).problem.material
+    a = np.asarray(material.viscosity)
+    m, r = (mandel_vector(np.asarray(t)) for t in (material.expansion, material.heating))
+    return float(np.sqrt((m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
+
+
+def growth(scene: Scene) -> float:
+    """The largest growth of the energy in a step over its start, when a warm moving body is left to itself."""
+    free = scene.override(
+        **{"contact.heat_exchange.foundation_temperature": 0.0, "heat.source": 0.0, "loads": {"body": [0.0, 0.0]}},
+        **{"initial.velocity": [0.5, -0.5], "initial.temperature": 1.0},
+    )
+    job, g = Run(free), heat_weight(free)
+    energies = [energy(job, g), *(energy(job, g) for _ in job.steps())]
+    if job.outcome != "right":
+        raise RuntimeError(f"the run without loads ended: {job.outcome}")
+    return float(np.diff(energies).max() / energies[0])
+
+
+def other_answer(scene: Scene) -> float:
+    """Distance of the end of a run from that of one whose contact is solved by projected gradients alone, over its norm."""
+    job = Run(scene)
+    for _ in job.steps():
+        pass
+    d, options = job.discretisation, _core.ContactOptions()
+    options.newton_steps, options.tolerance = 0, 1e-10
+    other = _core.Stepper2(
+        *(d.layout, d.problem, d.operators, d.surface),
+        k=scene.step,
+        coupling=getattr(_core.Coupling, scene.time.coupling),
+        backend=_core.Backend.automatic,
+        contact=options,
+    )
+    still = np.zeros((len(d.mesh.nodes), d.dim))
+    d.restart(other, still, still, still[:, 0].copy(), 0.0)
+    for n in range(1, scene.time.steps + 1):
+        report = other.advance(*d.load_vectors.at(n * scene.step))
+        if report.outcome != _core.Outcome.right or report.stage != _core.Stage.fixed_point:
+            raise RuntimeError(f"step {n} without Newton ended: {report.outcome.name}, {report.stage.name}")
+    one, two = d.field(job.stepper.w), d.field(other.w)
+    return float(np.abs(one - two).max() / np.abs(one).max())
+
+
+def orders(scene: Scene, levels: tuple[int, int] = LEVELS) -> dict[str, float]:
+    """The order of each term between successive grids h = k = 1/n, each measured against its double."""
+    coarse, fine = (study(scene, levels=[n], reference=2 * n)[0] for n in levels)
+    return {term: observed(coarse[f"e_{term}"], fine[f"e_{term}"]) for term in ("u_V", "w_L2", "theta_L2")}
+
+
+def lines(reading: str) -> Iterator[Line]:
+    """The claims on one reading that runs can contradict; a claim that the audit does not make gives no line."""
+    small = warmslip.load(f"paper_{reading}").override(**{"mesh.n": 16, "time.steps": 16})
+    found = examine(discretise(small))
+
+    def claimed(topic: str) -> Finding | None:
+        finding = find(found, topic)
+        return finding if finding.holds == "yes" else None
+
+    if claimed("coupling, energy") and claimed("coupling, staggered step"):
+        what = "without loads the energy does not grow in any step"
+        grown = growth(small)
+        yield Line(f"{reading}, left to itself", what, "theory", 0.0, grown, -1.0, ROUNDING)
+    if claimed("friction, one answer a step"):
+        few = small.override(**{"mesh.n": 8, "time.steps": 8}, **HOT)
+        what = "Newton's answer is the one of projected gradients from another start"
+        yield below(f"{reading}, two methods", what, "theory", other_answer(few), AGREEMENT)
+    singular = find(found, "(H3)").holds != "yes"
+    for theta, terms in TERMS.items():
+        scene = small.override(**{"contact.heat_exchange.foundation_temperature": theta})
+        seen = orders(scene)
+        for term in terms:
+            owed = entitled(term, hot=theta > 0, singular_conductivity=singular, viscosity=scene.viscosity.pair(2))
+            case = f"{reading}, theta_F = {theta:g}, {term}, h = k = 1/{LEVELS[0]} to 1/{2 * LEVELS[1]}"
+            yield order(case, "the order between successive grids is the entitled one", "theory", owed, seen[term])
