@@ -21,6 +21,7 @@ import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
+from threading import Lock
 from typing import NamedTuple
 
 from rich.progress import Progress
@@ -148,6 +149,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help="faults to try (default: all)")
     parser.add_argument("--handful", type=int, help="so many, others after every commit; the tests are taken to pass")
     parser.add_argument("--jobs", type=int, default=CORES, help="trees at work at once")
+    parser.add_argument("--resume", action="store_true", help="keep what the table at --out says of other faults")
     parser.add_argument("--every", action="store_true", help="run all tests, not only up to the first that fails")
     parser.add_argument("--workflow", action="store_true", help="run the small workflow as well, for its verdict")
     parser.add_argument("--trees", type=Path, help="where to keep the built trees for the next time (default: nowhere)")
@@ -160,6 +162,8 @@ def main() -> int:
         options.out = options.out or TABLE
     if unknown := set(options.names) - {f.name for f in chosen}:
         parser.error(f"unknown faults: {', '.join(sorted(unknown))}")
+    table = read(options.out) if options.resume and options.out else {}
+    chosen = [f for f in chosen if f.name not in table]
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, Progress() as progress:
         jobs = min(options.jobs, len(chosen))
@@ -184,14 +188,18 @@ def main() -> int:
             progress.print(f"{fault.name}: {found.outcome}, {found.by}", markup=False, highlight=False)
             sys.stdout.flush()
             progress.advance(judging)
+            with writing:
+                table[fault.name] = found
+                write(options.out, table)
             return found
 
+        writing = Lock()
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(ready, range(jobs)))
             judging = progress.add_task("mutants", total=len(chosen))
-            table = list(pool.map(one, chosen))
+            list(pool.map(one, chosen))
 
-    return report(table, options.out)
+    return report(list(table.values()))
 
 
 def handful(all_: list[Fault], count: int) -> list[Fault]:
@@ -201,14 +209,30 @@ def handful(all_: list[Fault], count: int) -> list[Fault]:
     return all_[int(commits or 0) % stride :: stride][:count]
 
 
-def report(table: list[Found], out: Path | None) -> int:
-    """Writes the table; 0 when every fault compiles and is killed, or is known to change nothing."""
-    if out:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with out.open("w", newline="") as file:
-            lines = csv.writer(file, lineterminator="\n")
-            lines.writerow(["fault", "file", "what", "outcome", "by"])
-            lines.writerows([f.fault.name, f.fault.file, f.fault.what, f.outcome, f.by] for f in table)
+def read(path: Path) -> dict[str, Found]:
+    """What an earlier call wrote, of faults that still exist; nothing when it wrote nothing."""
+    if not path.exists():
+        return {}
+    known = {fault.name: fault for fault in faults()}
+    with path.open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["fault"] in known]
+    return {row["fault"]: Found(known[row["fault"]], row["outcome"], row["by"]) for row in rows}
+
+
+def write(path: Path | None, table: dict[str, Found]) -> None:
+    """The table so far, in the order of faults.toml."""
+    if path is None:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(["fault", "file", "what", "outcome", "by"])
+        found = [table[fault.name] for fault in faults() if fault.name in table]
+        lines.writerows([f.fault.name, f.fault.file, f.fault.what, f.outcome, f.by] for f in found)
+
+
+def report(table: list[Found]) -> int:
+    """Prints the score; 0 when every fault compiles and is killed, or is known to change nothing."""
     bad = [f.fault.name for f in table if f.outcome != "killed" and not (f.outcome == "survived" and f.fault.survives)]
     killed = sum(f.outcome == "killed" for f in table)
     print(
