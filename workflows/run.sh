@@ -4,7 +4,7 @@
 # What is already there and up to date is not made again. Ends non-zero when a job or the verdict failed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-duration="10 to 15 minutes on two cores" # measured: 9.6 and 14.8
+duration="9 to 15 minutes on two cores" # measured: 9.6 and 14.8
 
 bash workflows/setup.sh
 . workflows/env.sh

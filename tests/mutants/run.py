@@ -28,8 +28,7 @@ from rich.progress import Progress
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-# fast and near the mathematics first; -x stops at the first that fails
-SUITE = ["tests/verification", "tests/unit", "-m", "not slow", "--deselect", "tests/unit/test_public_files.py"]
+SELECT = ["-m", "not slow", "--deselect", "tests/unit/test_public_files.py"]
 TABLE = ROOT / "results/verification/mutants.csv"
 CORES = os.cpu_count() or 1
 
@@ -96,21 +95,40 @@ class Tree:
         error = re.search(r"error: .*", result.stdout + result.stderr)
         return "" if result.returncode == 0 else error[0] if error else "the build failed"
 
-    def failures(self, *, every: bool) -> list[str]:
-        """The tests that fail: the first, or all of them."""
+    def failures(self, *, every: bool, near: str = "") -> list[str]:
+        """The tests that fail: the first, or all of them. Those that name the Python module `near` come first, without one
+        those of the core itself."""
+        found = [] if near else self._native()
+        if not found or every:
+            found += self._python(near, every=every)
+        if near and (not found or every):
+            found += self._native()
+        return list(dict.fromkeys(found))
+
+    def _native(self) -> list[str]:
+        tests = self._run("build/tests/tests/cpp/test_core")
+        found = [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", tests.stdout)]
+        return found or self._crash(tests)
+
+    def _python(self, near: str, *, every: bool) -> list[str]:
+        # of the mathematics first
+        files = [
+            p for folder in ("verification", "unit") for p in sorted((self.at / "tests" / folder).glob("test_*.py"))
+        ]
+        files.sort(key=lambda path: not (near and re.search(rf"\b{near}\b", path.read_text())))
         tests = self._run(
             *(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE"),
             *([] if every else ["-x"]),
-            *SUITE,
+            *SELECT,
+            *map(str, files),
         )
         found = re.findall(r"^(?:FAILED|ERROR) (?:tests/)?(.+?)(?: - .*)?$", tests.stdout, re.MULTILINE)
-        if found and not every:
-            return found
-        native = self._run("build/tests/tests/cpp/test_core")
-        found += [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", native.stdout)]
-        if not found and (tests.returncode or native.returncode):
-            found.append("a crash" if tests.returncode < 0 or native.returncode < 0 else "the tests did not run")
-        return list(dict.fromkeys(found))
+        return found or self._crash(tests)
+
+    def _crash(self, tests: subprocess.CompletedProcess[str]) -> list[str]:
+        if tests.returncode == 0:
+            return []
+        return ["a crash" if tests.returncode < 0 else "the tests did not run"]
 
     def verdict(self) -> list[str]:
         """What the small workflow finds: the checks that its verdict fails, or the jobs that stopped before it."""
@@ -136,7 +154,8 @@ class Tree:
             error = self.build()
             if error:
                 return Found(fault, "invalid", error)
-            failed = self.failures(every=every)
+            python = fault.file.endswith(".py")
+            failed = self.failures(every=every, near=path.stem if python else "")
             if workflow:
                 failed += [f"workflow: {name}" for name in self.verdict()]
             return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
