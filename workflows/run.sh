@@ -29,6 +29,9 @@ if grep -q '^total ' <<<"$plan"; then
 else
   echo "== everything of $config is up to date"
 fi
+for argument in "$@"; do  # a dry run leaves everything as it is, the report too
+  case $argument in -n | --dry-run | --dryrun) exit "$status" ;; esac
+done
 
 # the report again only when something in it is newer; a missing figure leaves the old one
 if [[ ! -e $report || -n $(find "$paper" "$(folder tradeoff)" "$(folder extremes)" -newer "$report" -type f -print -quit) ]]; then

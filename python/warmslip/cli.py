@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from warmslip import cli_verify
 from warmslip import scene as scenes
 from warmslip.cli_verify import SceneName, Set
+from warmslip.figures import KINDS
 from warmslip.scene import Scene, SceneError
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
@@ -32,6 +34,13 @@ def _levels(text: str) -> list[int]:
     if not levels or any(level < 1 for level in levels):
         raise SceneError(f"--levels '{text}' needs positive integers; write 16,32,64")
     return levels
+
+
+def _writable(out: Path) -> Path:
+    """`out`, whose folder is there now: nothing is computed for a file that cannot be written. Raises OSError."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.open("a").close()
+    return out
 
 
 def _bar(rank: int = 0) -> Progress:
@@ -100,11 +109,14 @@ def study(
     checked = scenes.load(scene, set_)
     if grid not in ("diagonal", "full"):
         raise SceneError(f"--grid '{grid}' is unknown; use diagonal or full")
+    sizes = _levels(levels)
+    studies.members(sizes, reference, grid)  # refuses before anything is computed
+    _writable(out)
     with _bar() as bar:
         task = bar.add_task(out.stem, total=reference, note="")
         rows = studies.study(
             checked,
-            levels=_levels(levels),
+            levels=sizes,
             reference=reference,
             grid=grid,
             progress=lambda n, _: bar.update(task, completed=n),
@@ -123,6 +135,7 @@ def manufactured(
     from warmslip import study as studies
 
     checked = scenes.load("paper_isotropic", set_)
+    _writable(out)
     rows = made.table(checked, ["staggered", "lagged", "monolithic"], _levels(levels), "h=k")
     rows += made.table(checked, ["staggered"], _levels(levels), "k=h^2")
     studies.write(out, rows, studies.stamp(checked, levels=levels))
@@ -141,14 +154,20 @@ def extremes(
     from warmslip import study as studies
 
     checked = scenes.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])])
-    studies.write(out, ladders.table(checked), studies.stamp(checked))
+    studies.write(_writable(out), ladders.table(checked), studies.stamp(checked))
 
 
-def _derived(out: Path, rows: list[dict[str, Any]], sources: list[Path]) -> None:
+def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
+    """Writes a table made from other tables; ValueError when those are not what they should be."""
     from warmslip import provenance
     from warmslip import study as studies
 
-    studies.write(out, rows, provenance.stamp(sources=[p.name for p in sources]))
+    names = [p.name for p in sources]
+    try:
+        rows = make()
+    except (LookupError, TypeError, UnicodeDecodeError, ZeroDivisionError) as error:
+        raise ValueError(f"{', '.join(names)}: not tables that `warmslip study` wrote ({error!r})") from error
+    studies.write(out, rows, provenance.stamp(sources=names))
 
 
 @app.command()
@@ -156,8 +175,7 @@ def rates(tables: Tables, out: Csv) -> None:
     """Observed, bias-corrected and entitled orders of studies."""
     from warmslip import rates as orders
 
-    rows = [row for path in tables for row in orders.table(path, _scene_of(path))]
-    _derived(out, rows, tables)
+    _derived(out, lambda: [row for path in tables for row in orders.table(path, _scene_of(path))], tables)
 
 
 def _scene_of(path: Path) -> dict[str, Any]:
@@ -169,7 +187,7 @@ def readings(tables: Tables, out: Csv) -> None:
     """Which reading of the paper satisfies which of its claims."""
     from warmslip import readings as claims
 
-    _derived(out, claims.table(tables), tables)
+    _derived(out, lambda: claims.table(tables), tables)
 
 
 @app.command()
@@ -177,7 +195,7 @@ def work(tables: Tables, out: Csv) -> None:
     """Work against precision of every run of studies, with the front."""
     from warmslip import work as precision
 
-    _derived(out, precision.table(tables), tables)
+    _derived(out, lambda: precision.table(tables), tables)
 
 
 @app.command()
@@ -195,6 +213,7 @@ def judge(
 ) -> None:
     """Compare measured tables with bands and stored values; always writes the verdict."""
     from warmslip import judge as court
+    from warmslip import provenance
 
     def verdict() -> dict[str, Any]:
         return court.verdict(
@@ -210,7 +229,8 @@ def judge(
         expected.write_text(json.dumps(court.record(result), indent=1) + "\n")
         result = verdict()
     out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(result, indent=1) + "\n")
+    stamp = provenance.stamp(sources=[p.name for p in (*(studies or []), manufactured, readings, extremes) if p])
+    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n")
     typer.echo(
         f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
     )
@@ -223,7 +243,7 @@ def judge(
 
 @app.command()
 def draw(
-    kind: Annotated[str, typer.Argument(help="which figure")],
+    kind: Annotated[str, typer.Argument(help="; ".join(f"{kind}: from {what}" for kind, (_, what) in KINDS.items()))],
     inputs: Annotated[list[Path], typer.Argument(help="tables or trajectories it is drawn from")],
     out: Annotated[Path, typer.Option(help="the PNG to write; its caption goes beside it as .rst")],
 ) -> None:

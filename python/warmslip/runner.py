@@ -168,7 +168,8 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").unlink(missing_ok=True)  # it would speak of another run
+        for name in ("summary.json", "final.vtu"):  # they would speak of another run
+            (folder / name).unlink(missing_ok=True)
     job = Run(scene, comm=comm, loads=loads, backend=backend)
     rank = job.comm.rank
     path = folder / "trajectory.h5" if folder is not None else None

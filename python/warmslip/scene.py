@@ -242,6 +242,8 @@ def _sentence(error: Any) -> str:
         case "value_error":
             message = str(error["ctx"]["error"])
             return message if key == "scene" else f"{key}: {message}"
+        case "model_type":
+            return f"{key} is a table, not {given!r}; its keys are {', '.join(_allowed(where))}"
         case "finite_number":
             return f"{key}: {given} is not a finite number; give one"
         case _:

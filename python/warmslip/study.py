@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from warmslip import _core, provenance
 from warmslip.errors import Comparison, Largest
@@ -24,7 +25,16 @@ from warmslip.scene import Scene, SceneError
 
 
 def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int]]:
-    """(1/h, steps) of the grid: `diagonal` has h = k, `full` every pair; the reference itself is not a member."""
+    """(1/h, steps) of the grid: `diagonal` has h = k, `full` every pair; the reference itself is not a member.
+
+    Raises SceneError for a reference that is not finer than every level, levels that repeat, or sizes that are not nested.
+    """
+    if max(levels) >= reference:
+        raise SceneError(
+            f"the reference 1/{reference} is not finer than the level 1/{max(levels)}; give a larger --reference"
+        )
+    if len(set(levels)) < len(levels):
+        raise SceneError(f"levels {levels} name a size twice; name each once")
     if any(reference % level for level in levels):
         raise SceneError(
             f"levels {levels} do not divide the reference {reference}; meshes and times would not be nested"
@@ -124,7 +134,7 @@ def stamp(scene: Scene | None, **more: Any) -> dict[str, Any]:
         scene,
         petsc=_core.petsc_version,
         compiler=_core.compiler,
-        ranks=1,
+        ranks=MPI.COMM_WORLD.size,
         petsc_options=petsc_options(),
         peak_memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         **more,

@@ -180,6 +180,66 @@ TEST_CASE("lists are refused by the first faulty entry") {
   }
 }
 
+TEST_CASE("lists in space are refused alike") {
+  const Mesh<3> brick = box<3>({1, 1, 1}, {1, 1, 1}, Diagonal::right);
+  RealTable<3> nodes = brick.nodes;
+  IndexTable<4> cells = brick.cells;
+  std::map<std::string, IndexTable<3>> parts{{"floor", brick.part("bottom").nodes}};
+  const auto names = [&](const std::string& words) {
+    try {
+      mesh_from_lists<3>(nodes, cells, parts);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what()).find(words) != std::string::npos;
+    }
+    return words.empty();
+  };
+  CHECK(names(""));
+  SUBCASE("not finite") {
+    nodes(2, 2) = NAN;
+    CHECK(names("node 2"));
+  }
+  SUBCASE("duplicate") {
+    nodes.row(7) = nodes.row(0);
+    CHECK(names("nodes 0 and 7"));
+  }
+  SUBCASE("out of range") {
+    cells(5, 3) = 8;
+    CHECK(names("cell 5 names node 8"));
+  }
+  SUBCASE("inverted") {
+    std::swap(cells(1, 0), cells(1, 1));
+    CHECK(names("cell 1 is inverted"));
+  }
+  SUBCASE("flat") {
+    cells(0, 1) = cells(0, 0);
+    CHECK(names("cell 0 is flat"));
+  }
+  SUBCASE("orphan") {
+    nodes.conservativeResize(9, 3);
+    nodes.row(8) << 2, 2, 2;
+    CHECK(names("node 8 belongs to no cell"));
+  }
+  SUBCASE("a cell twice") {
+    cells.conservativeResize(8, 4);
+    cells.row(6) = cells.row(0);
+    cells.row(7) = cells.row(0);
+    CHECK(names("more than two cells share a facet"));
+  }
+  SUBCASE("inner facet") {
+    parts["floor"].row(0) << 0, 1, 7;
+    CHECK(names("facet 0 of part 'floor'"));
+  }
+  SUBCASE("no part of that name") {
+    CHECK_THROWS_WITH_AS(brick.part("roof"),
+                         "the mesh has no boundary part 'roof'; its parts are: back, bottom, front, left, right, top",
+                         std::invalid_argument);
+  }
+  SUBCASE("a box of nothing") {
+    CHECK_THROWS_AS(box<3>({1, 0, 1}, {1, 1, 1}, Diagonal::right), std::invalid_argument);
+    CHECK_THROWS_AS(box<3>({1, 1, 1}, {1, 1, 0}, Diagonal::right), std::invalid_argument);
+  }
+}
+
 TEST_CASE("prolongation is exact between nested meshes and refuses others") {
   for (const Diagonal diagonal : {Diagonal::right, Diagonal::left}) {
     check_prolongation<2>(box<2>({3, 2}, {1, 2}, diagonal), box<2>({12, 8}, {1, 2}, diagonal));

@@ -31,8 +31,12 @@ SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
             ["unknown boundary part", "a traction on it does nothing"],
         ),
         (["paper_mixed", "--backend", "magic"], ["--backend 'magic' is unknown"]),
+        (
+            ["paper_mixed", "--set", "contact.friction=0.3"],
+            ["contact.friction is a table, not 0.3; its keys are coeff"],
+        ),
     ],
-    ids=["unknown key", "two problems", "singular", "missing file", "unknown part", "backend"],
+    ids=["unknown key", "two problems", "singular", "missing file", "unknown part", "backend", "table"],
 )
 def test_refusals(command: Command, tmp_path: Path, arguments: list[str], lines: list[str]) -> None:
     result = command("run", *arguments, "--out", "run")
@@ -67,3 +71,34 @@ def test_list_and_schema(command: Command) -> None:
     assert all(name in listed for name in ("paper_printed", "paper_consistent", "block_3d"))
     printed = json.loads(command("schema").stdout)
     assert printed == type(load("paper_mixed")).model_json_schema()
+
+
+def test_a_study_is_refused_before_it_is_computed(command: Command, tmp_path: Path) -> None:
+    """Sizes that measure nothing, and a place where nothing can be written."""
+    result = command("study", "paper_mixed", "--levels", "16,32", "--reference", "32", "--out", "study.csv")
+    assert result.returncode == 2
+    assert "not finer" in result.stderr
+    assert not (tmp_path / "study.csv").exists()
+    (tmp_path / "taken").mkdir()
+    result = command("study", "paper_mixed", "--levels", "2,4", "--reference", "8", "--out", "taken")
+    assert result.returncode == 2
+    assert "taken" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["rates", "table.csv", "--out", "rates.csv"], "not tables that `warmslip study` wrote"),
+        (["draw", "errors", "table.csv", "--out", "a.png"], "'errors' is drawn from studies named"),
+        (["draw", "errors", "mixed_0_staggered.csv", "--out", "a.png"], "will not do"),
+        (["draw", "figure_9", "table.csv", "--out", "a.png"], "unknown figure 'figure_9'; give one of setting"),
+    ],
+)
+def test_tables_of_another_kind_are_refused(command: Command, tmp_path: Path, arguments: list[str], words: str) -> None:
+    (tmp_path / "table.csv").write_text("a,b\n1,2\n")
+    (tmp_path / "table.json").write_text("{}")
+    (tmp_path / "mixed_0_staggered.csv").write_bytes(b"\x89PNG")
+    result = command(*arguments)
+    assert result.returncode == 2
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1

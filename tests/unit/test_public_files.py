@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from warmslip import _core, scene
+from warmslip import _core, figures, scene
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "warmslip"
@@ -39,3 +40,9 @@ def test_readme_example_runs(
     said = capsys.readouterr().out.splitlines()
     assert said[-2].startswith("right {'energy'")
     assert "'u_V': 0.09" in said[-1] or "'u_V': 0.10" in said[-1], said[-1]
+
+
+def test_every_kind_of_figure_is_a_drawing() -> None:
+    for kind, (module, inputs) in figures.KINDS.items():
+        assert callable(getattr(import_module(f"warmslip.figures.{module}"), kind)), kind
+        assert inputs

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import judge, rates, readings
+from warmslip import judge, rates, readings, study
 from warmslip.errors import SUMS, TERMS
 from warmslip.runner import IDENTITIES
 
@@ -34,6 +34,13 @@ def test_bias_of_the_self_reference(p: float, shown: tuple[float, ...]) -> None:
     for n, coarse, fine, expected in zip(LEVELS, errors, errors[1:], shown, strict=False):
         assert rates.observed(coarse, fine) == pytest.approx(expected, abs=0.005)
         assert rates.corrected(coarse, fine, 1 / n, REFERENCE, quadratic=False) == pytest.approx(p, abs=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [2.0, 3.0, 4.0])
+def test_bias_of_other_ratios(ratio: float) -> None:
+    h, reference = 1 / 4, 1 / 144
+    errors = [x - reference for x in (h, h / ratio)]
+    assert rates.corrected(*errors, h, reference, quadratic=False, ratio=ratio) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_bias_in_the_energy_norm() -> None:
@@ -103,6 +110,40 @@ def test_table_of_orders(tmp_path: Path) -> None:
     assert [r["observed"] for r in own[1:]] == pytest.approx([1.10, 1.22, 1.58], abs=0.005)
     assert [r["corrected"] for r in own[1:]] == pytest.approx([1.0] * 3, abs=1e-9)
     assert {r["entitled"] for r in own} == {1.0}
+    assert all(math.isnan(r["corrected"]) for r in found if r["term"] in SUMS)
+    few = write(tmp_path / "few_0_staggered.csv", [*rows[:2], study_rows()[-1]])
+    with pytest.raises(ValueError, match="2 levels with h = k say nothing about an order"):
+        rates.table(few, scene)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"initial.temperature": 1.0},
+        {"supports.temperature": ["top"]},
+        {"loads.traction": {}},
+        {"viscosity.lame": [0.0, 0.0]},
+        {"inertia.density": 0.0},
+        {"initial.velocity": [1.0, 0.0]},
+    ],
+)
+def test_entitled_orders_are_the_papers_alone(tmp_path: Path, keys: Row) -> None:
+    """What holds other scenes back is not known here: no number rather than one of another problem."""
+    scene = warmslip.load("paper_mixed")
+    assert rates.papers(scene.override(**{"contact.friction.coefficient": 0.5}))
+    assert not rates.papers(scene.override(**keys))
+    assert not rates.papers(warmslip.load("block_3d"))
+    path = write(tmp_path / "other_0_staggered.csv", study_rows())
+    assert all(math.isnan(r["entitled"]) for r in rates.table(path, scene.override(**keys).resolved()))
+
+
+@pytest.mark.parametrize(
+    ("levels", "reference", "sentence"),
+    [([16, 32], 32, "not finer than the level 1/32"), ([16, 16], 32, "a size twice"), ([16, 24], 32, "nested")],
+)
+def test_grids_that_measure_nothing_are_refused(levels: list[int], reference: int, sentence: str) -> None:
+    with pytest.raises(warmslip.SceneError, match=sentence):
+        study.members(levels, reference, "diagonal")
 
 
 def test_readings_judge_the_claims(tmp_path: Path) -> None:

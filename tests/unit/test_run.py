@@ -40,6 +40,19 @@ def test_summary_holds_what_others_script_against(small: MakeScene, tmp_path: Pa
     assert contact["traction"] == pytest.approx([-contact["tangential_force"], contact["normal_force"]], rel=1e-12)
 
 
+def test_a_run_that_stops_leaves_nothing_of_another(small: MakeScene, tmp_path: Path) -> None:
+    warmslip.run(small(), out=tmp_path)
+    assert (tmp_path / "final.vtu").exists()
+    with pytest.raises(ValueError, match="not finite"):
+        warmslip.run(small(), out=tmp_path, loads=replace(Loads.of(small()), source=float("nan")))
+    failing = replace(Loads.of(small()), source=lambda x, t: np.full(len(x), np.nan if t > 0.6 else 0.0))
+    warmslip.run(small(), out=tmp_path)
+    with pytest.raises(ValueError, match="not finite"):
+        warmslip.run(small(), out=tmp_path, loads=failing)
+    assert not (tmp_path / "summary.json").exists()
+    assert not (tmp_path / "final.vtu").exists()
+
+
 def test_stamp_says_what_produced_it_and_not_who(small: MakeScene) -> None:
     scene = small()
     stamp = warmslip.run(scene).summary["stamp"]

@@ -6,6 +6,7 @@ Every drawing is a function of its input files that returns a figure and a capti
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,36 +16,38 @@ if TYPE_CHECKING:
 Drawing = Callable[[list[Path]], "tuple[Figure, str]"]
 
 
-def drawings() -> dict[str, Drawing]:
-    """Every kind of figure by name."""
-    from warmslip.figures import convergence, fields, maps, setting, tradeoff, verification
-
-    return {
-        "setting": setting.setting,
-        "deformed": fields.deformed,
-        "temperature": fields.temperature,
-        "mises": fields.mises,
-        "errors": convergence.errors,
-        "corrected": convergence.corrected,
-        "grid": maps.grid,
-        "table": maps.table,
-        "extremes": maps.extremes,
-        "work": tradeoff.work,
-        "graded": verification.graded,
-        "verdicts": verification.verdicts,
-    }
+# where each is drawn, and from what
+KINDS = {
+    "setting": ("setting", "trajectories of a cold and a hot foundation"),
+    "deformed": ("fields", "trajectories, a panel each"),
+    "temperature": ("fields", "trajectories, a panel each"),
+    "mises": ("fields", "trajectories, a panel each"),
+    "errors": ("convergence", "studies named READING_THETA_COUPLING.csv, a panel each"),
+    "corrected": ("convergence", "the table of rates, then studies it speaks of"),
+    "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
+    "table": ("maps", "the table of readings"),
+    "extremes": ("maps", "the table of extremes"),
+    "work": ("tradeoff", "the table of work"),
+    "graded": ("verification", "graded_table.csv of the verification"),
+    "verdicts": ("verification", "tables of verification lines"),
+}
 
 
 def draw(kind: str, inputs: list[Path], out: Path) -> None:
     """Draws `kind` from `inputs` into `out` (PNG), with its caption beside it as .rst.
 
-    Raises ValueError for an unknown kind, OSError or KeyError when an input is missing or lacks what the figure shows.
+    Raises ValueError for an unknown kind and for inputs that it cannot be drawn from, OSError when one is missing.
     """
     from warmslip.figures import style
 
-    known = drawings()
-    if kind not in known:
-        raise ValueError(f"unknown figure '{kind}'; give one of {', '.join(known)}")
+    if kind not in KINDS:
+        raise ValueError(f"unknown figure '{kind}'; give one of {', '.join(KINDS)}")
+    module, source = KINDS[kind]
+    drawing: Drawing = getattr(import_module(f"warmslip.figures.{module}"), kind)
     with style.applied():
-        figure, caption = known[kind](list(inputs))
+        try:
+            figure, caption = drawing(list(inputs))
+        except (LookupError, TypeError, ValueError) as error:
+            given = ", ".join(str(path) for path in inputs)
+            raise ValueError(f"'{kind}' is drawn from {source}; {given} will not do ({error})") from error
         style.save(figure, caption, Path(out))

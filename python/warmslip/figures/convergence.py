@@ -96,8 +96,9 @@ def spoken(table: list[dict[str, str]], theta: str) -> str:
 
 
 def mean_order(table: list[dict[str, str]], name: str) -> float:
+    """Slope of the whole curve, by least squares, as in the table of readings."""
     e, h = column(table, f"e_{name}"), column(table, "h")
-    return float(np.log(e[0] / e[-1]) / np.log(h[0] / h[-1])) if len(e) > 1 else float("nan")
+    return float(np.polyfit(np.log(h), np.log(e), 1)[0]) if len(e) > 1 else float("nan")
 
 
 def corrected(inputs: list[Path]) -> tuple[Figure, str]:

@@ -47,7 +47,10 @@ class Final:
 
 
 def final(path: Path) -> Final:
+    """The last state. Raises ValueError for a body in space, OSError for what is no trajectory."""
     with h5py.File(path, "r") as file:
+        if file["mesh/nodes"].shape[1] != 2:
+            raise ValueError("a body in space cannot be drawn here: open its final.vtu in ParaView")
         return Final(
             scene=build({k: v for k, v in json.loads(file.attrs["scene"]).items() if v is not None}),
             time=float(file["states/time"][-1]),

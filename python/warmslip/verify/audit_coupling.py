@@ -141,7 +141,7 @@ def coupling(d: Discretisation) -> Iterator[Finding]:
 
 
 def _sign(c: float, m: Array, r: Array) -> Finding:
-    values = (("c", c), ("|M|", float(np.linalg.norm(m))), ("|R|", float(np.linalg.norm(r))))
+    values = (("c", -c), ("|M|", float(np.linalg.norm(m))), ("|R|", float(np.linalg.norm(r))))
     statement = "R = -c M with c > 0: what expansion takes from the motion, heating gives back"
     if not m.any() or not r.any():
         meaning = "One of M and R is zero: one field acts on the other and nothing comes back."

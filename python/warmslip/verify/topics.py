@@ -63,7 +63,7 @@ def true_orders(folder: Path) -> list[Line]:
         "uniform": graded.unbiased(graded.study(scene, graded.UNIFORM, [16, 32, 64, 128], 256), 256),
     }
     save(folder / "graded_table.csv", [{"grids": name, **row} for name, rows in studies.items() for row in rows])
-    return graded.lines("paper_mixed, theta_F = 10", studies["graded"], studies["uniform"])
+    return graded.lines("paper_mixed, theta_F = 10", scene, studies["graded"], studies["uniform"])
 
 
 def value_and_uncertainty(folder: Path) -> list[Line]:
