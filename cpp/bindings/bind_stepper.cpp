@@ -9,6 +9,7 @@ void bind(py::module_& m) {
   using R = StepReport<d>;
   py::class_<R>(m, name<d>("StepReport").c_str(), "What one step did.")
       .def_readonly("outcome", &R::outcome)
+      .def_readonly("reason", &R::reason, "of an outcome that is not right, in words")
       .def_readonly("stage", &R::stage)
       .def_readonly("newton_iterations", &R::newton_iterations)
       .def_readonly("open", &R::open)
@@ -125,6 +126,8 @@ void bind_stepper(py::module_& m) {
   term("force_residual", &Ledger::force_residual);
   term("law_residual", &Ledger::law_residual);
   term("law_floor", &Ledger::law_floor);
+  term("energy_floor", &Ledger::energy_floor);
+  term("force_floor", &Ledger::force_floor);
   ledger.attr("terms") = py::tuple(terms);
 
   auto cost =

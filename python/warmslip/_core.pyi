@@ -827,7 +827,7 @@ class Ledger:
     """
     Terms and relative residuals of the balances of one step.
     """
-    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor')
+    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor', 'energy_floor', 'force_floor')
     @property
     def conducted(self) -> float:
         ...
@@ -890,6 +890,12 @@ class Ledger:
         ...
     @property
     def law_floor(self) -> float:
+        ...
+    @property
+    def energy_floor(self) -> float:
+        ...
+    @property
+    def force_floor(self) -> float:
         ...
     @property
     def law_residual(self) -> float:
@@ -972,6 +978,11 @@ class StepReport2:
     @property
     def open(self) -> int:
         ...
+    @property
+    def reason(self) -> str:
+        """
+        of an outcome that is not right, in words
+        """
     @property
     def outcome(self) -> Outcome:
         ...
@@ -1076,6 +1087,11 @@ class StepReport3:
     @property
     def open(self) -> int:
         ...
+    @property
+    def reason(self) -> str:
+        """
+        of an outcome that is not right, in words
+        """
     @property
     def outcome(self) -> Outcome:
         ...

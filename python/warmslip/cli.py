@@ -90,8 +90,9 @@ def _told(summary: dict[str, Any]) -> str:
     if failure is None:
         worst = max(summary["identities"][i] for i in ("energy", "heat", "force", "law"))
         return f"{summary['steps']} steps, worst identity {worst:.1e}"
-    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.1e}" for name, value in failure.items() if name != "step")
-    return f"step {failure['step']} was not taken ({numbers})"
+    words = [failure["reason"]] if failure["reason"] else []
+    words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason")]
+    return f"step {failure['step']} was not taken ({', '.join(words)})"
 
 
 @app.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from warmslip.runner import IDENTITIES, Run
+from warmslip.runner import FLOORS, IDENTITIES, Run
 from warmslip.scene import Scene, SceneError
 
 Overrides = dict[str, Any]
@@ -65,7 +65,7 @@ def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
     """
     make, _ = LADDERS[ladder]
     line: dict[str, Any] = {"ladder": ladder, "value": value, "outcome": "", "reason": ""}
-    line |= dict.fromkeys([*IDENTITIES, "law_floor", "disagreement"], float("nan")) | {
+    line |= dict.fromkeys([*IDENTITIES, *FLOORS, "disagreement"], float("nan")) | {
         "newton_largest": 0,
         "stage": "",
         "steps": 0,
@@ -82,9 +82,9 @@ def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
     except (RuntimeError, MemoryError) as failure:
         return line | {"outcome": "solver_failed", "reason": str(failure).replace("\n", " "), "verdict": "stopped"}
     difference = disagreement(job, other)
-    reached = job.failure or {"law_floor": job.floor} | job.worst  # of the step that was not taken, where there is one
+    reached = job.failure or job.floors | job.worst  # of the step that was not taken, where there is one
     line |= {"outcome": job.outcome, "disagreement": difference} | {
-        key: reached[key] for key in (*IDENTITIES, "law_floor")
+        key: reached.get(key, float("nan")) for key in (*IDENTITIES, *FLOORS)
     }
     line |= {
         "newton_largest": job.newton_max,

@@ -90,8 +90,8 @@ def study(path: Path, expected: dict[str, Any]) -> list[Check]:
 
 def closed(cell: dict[str, Any]) -> bool:
     """Whether a cell's books close to EXTREME; the law beyond its floor, the energy beyond that of its four contact terms."""
-    floor = cell["law_floor"]
-    allowed = {"heat": EXTREME, "force": EXTREME, "energy": EXTREME + 4 * floor, "law": EXTREME + floor}
+    allowed = dict.fromkeys(("heat", "force"), EXTREME)
+    allowed |= {name: EXTREME + cell[f"{name}_floor"] for name in ("energy", "law")}
     return all(cell[name] <= bound for name, bound in allowed.items())
 
 

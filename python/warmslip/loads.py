@@ -64,9 +64,9 @@ class LoadVectors:
     """Load vectors (f, v) and (q, eta) and the gap at any time; what does not depend on time is assembled once."""
 
     def __init__(
-        self, layout: Any, surface: Any, loads: Loads, contact_part: str, conductance: float, dim: int
+        self, layout: Any, surface: Any, loads: Loads, contact_part: str, conductance: float, dim: int, comm: Any
     ) -> None:
-        self._surface, self._loads = surface, loads
+        self._surface, self._loads, self._comm = surface, loads, comm
         quadrature = _core.LoadQuadrature2 if dim == 2 else _core.LoadQuadrature3
         rules: dict[tuple[str | None, int], Any] = {}
 
@@ -101,9 +101,23 @@ class LoadVectors:
                 self._add(self._constant, mechanical, rule(part, data), data, 0.0)
 
     def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float) -> None:
-        vector = rule.load(evaluate(data, rule.positions, t, self._dim if mechanical else 1))
+        vector = rule.load(self._together(data, rule.positions, t, self._dim if mechanical else 1))
         (pair[0] if mechanical else pair[1]).axpy(1.0, vector)
         vector.destroy()  # petsc4py would only mark it for a later collection
+
+    def _together(self, data: Data, x: Array, t: float, components: int) -> Array:
+        """`evaluate` on every rank's own places; when it fails on one, all raise ValueError and none waits for the others."""
+        if self._comm.size == 1:
+            return evaluate(data, x, t, components)
+        values, error = np.empty((0, components)), ""
+        try:
+            values = evaluate(data, x, t, components)
+        except Exception as own:
+            error = str(own) or repr(own)
+        errors = [other for other in self._comm.allgather(error) if other]
+        if errors:
+            raise ValueError(errors[0])
+        return values
 
     def at(self, t: float) -> tuple[Any, Any, Array]:
         """(force, heat, gap) at time t, valid until the next call; the vectors must not be changed."""
@@ -114,4 +128,4 @@ class LoadVectors:
                 constant.copy(present)
             for mechanical, rule, data in self._moving:
                 self._add(pair, mechanical, rule, data, t)
-        return *pair, evaluate(self._loads.gap, self._surface.positions, t, 1)[:, 0]
+        return *pair, self._together(self._loads.gap, self._surface.positions, t, 1)[:, 0]

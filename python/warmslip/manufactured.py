@@ -8,6 +8,7 @@ data are smooth and O(h+k) is owed. What the contact law does not give is prescr
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -168,7 +169,14 @@ def grid(path: str, levels: list[int]) -> list[tuple[int, int]]:
 
 
 def table(scene: Scene, couplings: list[str], levels: list[int], path: str) -> list[dict[str, Any]]:
-    """Errors and orders along one path for each coupling; `levels` are 1/h, each twice the one before."""
+    """Errors and orders along one path for each coupling; `levels` are 1/h, each twice the one before.
+
+    Raises ValueError for fewer than three levels, or others than 4, 8, 16 .. times a number.
+    """
+    if len(levels) < 3:
+        raise ValueError(f"{len(levels)} levels say nothing about an order; give at least three")
+    if levels[0] % 4 or any(b != 2 * a for a, b in itertools.pairwise(levels)):
+        raise ValueError(f"levels {levels} must start with a multiple of 4 and double, as 8,16,32")
     out = []
     for coupling in couplings:
         before: dict[str, float] | None = None

@@ -149,7 +149,7 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
         raise ValueError(
             f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
         )
-    vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d)
+    vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d, comm)
     return Discretisation(
         scene,
         loads,

@@ -58,8 +58,13 @@ def corrected(coarse: float, fine: float, h: float, reference: float, *, quadrat
 
 
 def least_squares(h: Iterable[float], errors: Iterable[float]) -> tuple[float, float]:
-    """Order and root mean square misfit of log(error) = p log(h) + c over a grid."""
+    """Order and root mean square misfit of log(error) = p log(h) + c over a grid.
+
+    Raises ValueError for fewer than three sizes.
+    """
     x, y = np.log(np.array(list(h))), np.log(np.array(list(errors)))
+    if len(x) < 3:
+        raise ValueError(f"{len(x)} grids say nothing about an order; give at least three")
     (p, c), *_ = np.linalg.lstsq(np.stack([x, np.ones_like(x)], axis=1), y, rcond=None)
     return float(p), float(np.sqrt(np.mean((y - p * x - c) ** 2)))
 

@@ -19,6 +19,7 @@ from warmslip.scene import Scene
 from warmslip.trajectory import TrajectoryWriter
 
 IDENTITIES = ("energy", "heat", "force", "law")
+FLOORS = ("law_floor", "energy_floor", "force_floor")
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,12 @@ class Run:
         self.discretisation = discretisation or discretise(scene, comm=self.comm, loads=loads)
         self.stepper = self.discretisation.stepper(backend=backend)
         self.worst = dict.fromkeys(IDENTITIES, 0.0)
-        self.floor = 0.0
+        self.floors = dict.fromkeys(FLOORS, 0.0)
         self.outcome = "right"
         self.report: Any = None
         self.newton_max = 0
         self.stages: dict[str, int] = {}
-        self.failure: dict[str, float] | None = None
+        self.failure: dict[str, Any] | None = None
 
     def steps(self) -> Iterator[Any]:
         """Advances to the end, yielding a report a step; stops before a step that is not right, whose state is not kept."""
@@ -85,12 +86,15 @@ class Run:
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
             if report.outcome != _core.Outcome.right:
                 self.outcome = report.outcome.name
-                self.failure = {"step": n, "law_floor": report.ledger.law_floor} | residuals(report)
+                numbers = residuals(report) | {name: float(getattr(report.ledger, name)) for name in FLOORS}
+                known = {name: value for name, value in numbers.items() if value == value}  # nan: not computed
+                self.failure = {"step": n, "reason": report.reason} | known
                 return
             self.report = report
             for name, value in residuals(report).items():
                 self.worst[name] = worse(self.worst[name], value)
-            self.floor = worse(self.floor, report.ledger.law_floor)
+            for name in FLOORS:
+                self.floors[name] = worse(self.floors[name], getattr(report.ledger, name))
             yield report
 
     def summary(self) -> dict[str, Any]:
@@ -121,7 +125,7 @@ class Run:
                 "theta_L2": norms.l2(s.theta),
             },
             "contact": contact | counts | {"traction": traction},
-            "identities": self.worst | {"law_floor": self.floor},
+            "identities": self.worst | self.floors,
             "newton": {
                 "iterations": cost.newton_iterations,
                 "largest_step": self.newton_max,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from conftest import Command
+from conftest import Command, child_environment
 
 from warmslip import Trajectory
 
@@ -52,3 +54,31 @@ def test_refusals_are_said_once(command: Command) -> None:
     assert result.returncode == 2
     assert "Traceback" not in result.stderr
     assert result.stderr.count("mesh.n = 0.5: input should be a valid integer") == 1
+
+
+FAILING = """
+from dataclasses import replace
+import numpy as np
+import warmslip
+
+def body(x, t):
+    force = np.full(x.shape, -1.0)
+    force[(x[:, 0] < 0.05) & (t > 0.6)] = np.nan  # in a corner that one rank owns
+    return force
+
+scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 6})
+try:
+    warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), body=body))
+except ValueError as error:
+    print("refused: " + str(error) + chr(10), end="", flush=True)
+"""
+
+
+@pytest.mark.mpi
+def test_a_load_that_fails_on_one_rank_is_refused_by_both(tmp_path: Path) -> None:
+    (tmp_path / "failing.py").write_text(FAILING)
+    command = ["mpirun", "-n", "2", sys.executable, str(tmp_path / "failing.py")]
+    result = subprocess.run(
+        command, env=child_environment(), text=True, capture_output=True, timeout=120, cwd=tmp_path, check=True
+    )
+    assert result.stdout.count("refused: a load is not finite at t = 0.666667") == 2

@@ -72,9 +72,37 @@ def test_audits_and_faults_are_told(tmp_path: Path) -> None:
     )
     audits = [tmp_path / "audit_soft.csv", tmp_path / "audit_stiff.csv"]
     text, passed = report.markdown([tmp_path / "good.csv"], [], audits, tmp_path / "mutants.csv")
-    assert passed
+    assert not passed  # a fault survives and nobody knows why
     assert "| (H1) | m > 0 | **no** m_b = 0, M_b = inf | **yes** m_b = 12.35, M_b = inf |" in text
     assert "**1 of 3 killed (33.3 %)**" in text
     assert "| unit/test_run.py | 1 |" in text
     assert "| slow | a slower path | the same answer |" in text
     assert "| new | nobody knows | **unexplained** |" in text
+
+
+def killed(names: list[str], more: str) -> str:
+    lines = [f"{name},a.cpp,wrong,killed,unit/test_run.py::test_signs" for name in names]
+    return "\n".join(["fault,file,what,outcome,by", *lines, more]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "good", "words"),
+    [
+        ("slow,a.cpp,slower,survived,the same answer", True, "**20 of 21 killed (95.2 %)**"),
+        ("control,a.cpp,a comment,survived,nothing may notice", True, "**20 of 20 killed (100.0 %)**"),
+        ("control,a.cpp,a comment,killed,unit/test_a.py::test_b", False, "the score means nothing"),
+        ("broken,a.cpp,no syntax,invalid,error: expected", False, "**invalid**: error: expected"),
+        ("later,a.cpp,a sign,untried,", True, "1 not tried yet"),
+    ],
+)
+def test_the_score_of_the_faults(tmp_path: Path, more: str, good: bool, words: str) -> None:
+    (tmp_path / "mutants.csv").write_text(killed([f"f{i}" for i in range(20)], more))
+    text, explained = report.faults(tmp_path / "mutants.csv")
+    assert explained is good
+    assert words in "".join(text)
+    assert "none tried" in "".join(report.faults(_nothing(tmp_path))[0])
+
+
+def _nothing(folder: Path) -> Path:
+    (folder / "none.csv").write_text("fault,file,what,outcome,by\n")
+    return folder / "none.csv"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,23 @@ from warmslip.trajectory import LEDGER
 
 MakeScene = Callable[..., Scene]
 FIELDS = ("u", "w", "theta")
+
+
+@pytest.fixture(name="options")
+def _options() -> Iterator[dict[str, str]]:
+    """PETSc options for one test."""
+    from petsc4py import PETSc
+
+    chosen: dict[str, str] = {}
+
+    class Chosen(dict[str, str]):
+        def __setitem__(self, key: str, value: str) -> None:
+            chosen[key] = value
+            PETSc.Options()[key] = value
+
+    yield Chosen()
+    for key in chosen:
+        PETSc.Options().delValue(key)
 
 
 def test_summary_holds_what_others_script_against(small: MakeScene, tmp_path: Path) -> None:
@@ -163,22 +180,66 @@ def test_contact_that_does_not_converge_keeps_the_last_good_step(
         np.testing.assert_array_equal(t.u[-1], result.u)
 
 
-def test_a_linear_solver_that_fails_keeps_the_last_good_step(small: MakeScene) -> None:
+def test_a_linear_solver_that_fails_keeps_the_last_good_step(small: MakeScene, options: dict[str, str]) -> None:
     """An iteration of one step serves a heat equation without sources, until they are switched on after two steps."""
-    from petsc4py import PETSc
-
-    options = {"heat_ksp_type": "cg", "heat_pc_type": "none", "heat_ksp_max_it": "1"}
-    for key, value in options.items():
-        PETSc.Options()[key] = value
-    try:
-        scene = small(time__steps=6, loads__traction={}, loads__body=[0.0, 0.0])
-        loads = replace(Loads.of(scene), source=lambda x, t: np.full(len(x), 1.0 if t > 0.4 else 0.0))
-        result = warmslip.run(scene, loads=loads, backend="petsc")
-    finally:
-        for key in options:
-            PETSc.Options().delValue(key)
+    for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_max_it": "1"}.items():
+        options[f"heat_{key}"] = value
+    scene = small(time__steps=6, loads__traction={}, loads__body=[0.0, 0.0])
+    loads = replace(Loads.of(scene), source=lambda x, t: np.full(len(x), 1.0 if t > 0.4 else 0.0))
+    result = warmslip.run(scene, loads=loads, backend="petsc")
     assert (result.outcome, result.summary["steps"], result.summary["failure"]["step"]) == ("solver_failed", 2, 3)
+    assert result.summary["failure"] == {"step": 3, "reason": result.summary["failure"]["reason"]}  # no made-up numbers
+    assert "change the PETSc options that start with heat_" in result.summary["failure"]["reason"]
     assert not result.theta.any()
+
+
+def test_a_compliance_that_cannot_be_solved_for_is_refused(small: MakeScene, options: dict[str, str]) -> None:
+    for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_max_it": "2"}.items():
+        options[f"momentum_{key}"] = value
+    with pytest.raises(ValueError, match="the momentum solver ended with DIVERGED_ITS; change the PETSc options"):
+        Run(small(), backend="petsc")
+
+
+@pytest.mark.parametrize("field", ["heat", "momentum"])
+def test_loose_iterations_are_seen(small: MakeScene, options: dict[str, str], field: str) -> None:
+    """Conjugate gradients leave a residual that is orthogonal to the answer: sums close, the equations do not."""
+    for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_rtol": "1e-3"}.items():
+        options[f"{field}_{key}"] = value
+    free = {"heat__expansion__tensor": [[0.0, 0.0], [0.0, 0.0]], "supports__temperature": []}
+    alone = {"contact__gap": 1.0, "contact__heat_exchange__conductance": 0.0, "heat__source": 0.0}
+    sheared = {"loads__body": [1.0, 0.0], "loads__traction": {}, "heat__heating__tensor": [[1.0, 0.0], [0.0, 1.0]]}
+    scene = small(mesh__n=16, mesh__diagonal="crisscross", time__steps=8, **free, **alone, **sheared)
+    result = warmslip.run(scene, backend="petsc")
+    assert result.outcome == "identity_violated"
+    assert result.summary["failure"]["heat" if field == "heat" else "force"] > 1e-8
+
+
+@pytest.mark.parametrize(("speed", "outcome"), [(1.0, "right"), (1e10, "precision_lost")])
+def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float, outcome: str) -> None:
+    """Its displacement has sixteen digits; what is left of them in the strain is stated."""
+    pulled = {"loads__body": [0.0, 0.0], "loads__traction": {"left": [-1e-3, 0.0], "right": [1e-3, 0.0]}}
+    result = warmslip.run(
+        small("isotropic", supports__displacement=[], contact__gap=1e3, initial__velocity=[speed, 0.0], **pulled)
+    )
+    assert result.outcome == outcome
+    if outcome == "precision_lost":
+        assert "rounding hides its strain" in result.summary["failure"]["reason"]
+        assert result.summary["failure"]["force_floor"] > 1e-6
+
+
+def test_a_foundation_out_of_reach_costs_no_digits(small: MakeScene) -> None:
+    far, near = (warmslip.run(small(contact__gap=gap)) for gap in (1e9, 1.0))
+    assert (far.outcome, far.summary["identities"]["law_floor"]) == ("right", 0.0)
+    assert np.abs(far.u - near.u).max() <= 1e-14 * np.abs(near.u).max()
+
+
+def test_stiffness_that_is_not_touched_excuses_nothing(small: MakeScene) -> None:
+    """A needle without digits in its energy is refused for a stiff foundation as for a soft one, as long as it is open."""
+    for stiffness in (1e4, 1e10):
+        needle = {"mesh__lengths": [1e-4, 1.0], "contact__gap": 0.1, "contact__stiffness": stiffness}
+        result = warmslip.run(small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, **needle))
+        assert result.outcome == "identity_violated"
+        assert result.summary["failure"]["energy_floor"] == 0
 
 
 def test_an_operator_without_inverse_is_refused(small: MakeScene) -> None:
@@ -214,7 +275,7 @@ def test_a_step_that_does_not_close_its_books_is_not_taken(
     assert (result.outcome, result.right) == (outcome, False)
     failure = result.summary["failure"]
     assert result.summary["steps"] == failure["step"] - 1
-    assert max(failure[key] for key in (*runner.IDENTITIES, "law_floor")) > 1e-9
+    assert max(failure[key] for key in (*runner.IDENTITIES, *runner.FLOORS)) > 1e-9
     assert all(value <= 1e-9 for value in result.summary["identities"].values())
     if failure["step"] == 1:
         assert not result.u.any()  # the initial state is kept

@@ -31,6 +31,18 @@ def test_two_methods_give_one_answer() -> None:
         audit_runs.other_answer(small(contact__stiffness=1e9, **hot))
 
 
+def test_the_audit_makes_its_claims() -> None:
+    """An audit that proved nothing would leave nothing to contradict: what it must claim of the paper's data is a line too."""
+    lines = list(audit_runs.lines("mixed", (8, 16)))
+    assert [line.case for line in lines if "audit of" in line.case] == [
+        "mixed, audit of coupling, energy",
+        "mixed, audit of coupling, staggered step",
+        "mixed, audit of friction, one answer a step",
+    ]
+    assert len(lines) == 10
+    assert [line.case for line in lines[:5] if not line.passed] == []
+
+
 def test_successive_grids_have_no_bias() -> None:
     """A singular K leaves the temperature the order 1/2; against one fine solution it would show 0.98 here."""
     found = audit_runs.orders(small("printed"), (16, 32))

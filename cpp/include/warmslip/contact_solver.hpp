@@ -42,7 +42,8 @@ struct ContactSolution {
 
 /// How far (force, velocity) is from the law, relative to the largest force and the largest free velocity: the worst of
 /// |lambda_nu - p_nu(r_n)|, (|lambda_tau| - T)^+ and T |w_tau| - lambda_tau . w_tau over the points. `floor` receives
-/// what the rounding of r alone can cause: no digits of the pressure below c_nu eps (|u| + k |free|) can be had.
+/// what the rounding of r alone can cause where it may touch: no digits of the pressure below c_nu eps (|u| + k |free|)
+/// can be had.
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
                     double* floor);

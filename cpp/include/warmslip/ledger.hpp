@@ -21,8 +21,11 @@ struct Ledger {
   double inertia_damping, elastic_damping, contact_damping;  ///< backward Euler's own dissipation
   double viscous, friction;
   double load_work, expansion_work, gap_work;
-  double heat_change, heat_damping, conducted, exchanged, supplied, heating;       ///< the same balance for theta
-  double energy_residual, heat_residual, force_residual, law_residual, law_floor;  ///< relative to the largest term
+  double heat_change, heat_damping, conducted, exchanged, supplied, heating;  ///< the same balance for theta
+  double energy_residual, heat_residual, force_residual, law_residual;        ///< relative to the largest term
+  /// What rounding alone can cause, likewise: of the contact law, of the law's terms in the energy, of the internal
+  /// forces (a body that moves far for its deformation has no digits left in its strain).
+  double law_floor, energy_floor, force_floor;
 };
 
 struct StepInputs {

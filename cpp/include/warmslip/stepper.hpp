@@ -9,8 +9,9 @@ namespace warmslip {
 /// Which time level the coupling terms take: (theta_{n-1}, w_n), (theta_{n-1}, w_{n-1}) or (theta_n, w_n).
 enum class Coupling { staggered, lagged, monolithic };
 
-/// `precision_lost`: the stiffness is so large that rounding of the displacement hides the pressure, see
-/// Ledger::law_floor. `solver_failed`: a linear solve did not reach its answer (iterative ones, by PETSc's options).
+/// `precision_lost`: rounding of the displacement hides the pressure of a stiff foundation or the strain of a body that
+/// moves far, see Ledger::law_floor and force_floor. `solver_failed`: a linear solve did not reach its answer
+/// (iterative ones, by PETSc's options).
 enum class Outcome { right, contact_not_converged, not_finite, identity_violated, precision_lost, solver_failed };
 
 struct StepperOptions {
@@ -32,6 +33,7 @@ struct StepLoads {
 template <int d>
 struct StepReport {
   Outcome outcome = Outcome::right;
+  std::string reason;  ///< of an outcome that is not right, in words, where more can be said than its name
   Stage stage = Stage::none;
   int newton_iterations = 0;
   int open = 0, stick = 0, slip = 0;

@@ -1,5 +1,6 @@
 #include "warmslip/ledger.hpp"
 
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -152,11 +153,17 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   l.viscous = in.k * dot(after.w, viscous_w_);
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
+  const double contact_before = l.contact - l.contact_change;
+  const std::initializer_list<double> terms{l.kinetic,   kinetic_before,   l.elastic, elastic_before,
+                                            l.contact,   contact_before,   l.viscous, l.friction,
+                                            l.load_work, l.expansion_work, l.gap_work};
+  // the law's pressure, with its rounding, enters four terms: stored before and after, damping, friction
+  const double touching = std::max({l.contact, contact_before, l.contact_damping, l.friction, std::abs(l.gap_work)});
+  l.energy_floor = touching > 0 ? 4 * l.law_floor * relative(touching, terms) : 0;
   l.energy_residual =
       relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
                    l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work,
-               {l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, l.contact - l.contact_change,
-                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work});
+               terms);
 }
 
 // The heat balance tested with k theta_n; returns its relative residual.
@@ -174,7 +181,8 @@ double Bookkeeper<d>::heat(const Level& before, const Level& after, const StepIn
                   {stored, stored_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating});
 }
 
-// Heat content (eta = 1), force and moment (v rigid): the supports' reactions are the residuals of the fixed rows.
+// Heat content (eta = 1), force and moment (v rigid), and both equations at every free node: the supports' reactions
+// are the residuals of the fixed rows.
 template <int d>
 void Bookkeeper<d>::resultants(const Level& before, const Level& after, const StepInputs& in, double heat_energy,
                                Ledger& l) {
@@ -188,6 +196,12 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
   }
   Resultant<d> force;
   double content = 0, content_size = 0, force_rounding = 0, moment_rounding = 0, heat_rounding = 0;
+  // largest over the nodes: what an equation leaves over, the size of its terms, the forces in it and those applied
+  enum { motion, motion_size, heat_left, heat_size, forces_here, applied, internal_size };
+  std::array<double, 7> most{};
+  const auto raise = [&](int which, double value) {
+    most[static_cast<std::size_t>(which)] = std::max(most[static_cast<std::size_t>(which)], value);
+  };
   const double u = largest(after.u), w = largest(after.w), theta = largest(after.theta);
   {
     Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta),
@@ -205,17 +219,29 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
                                 viscous_rows_.template segment<d>(i * d) * w + at(g).cwiseAbs();
       force_rounding += internal.squaredNorm();
       moment_rounding += internal.squaredNorm() * position.squaredNorm();
-      if (clamped_[node]) force.add(position, -(inertia - load + contact_here + at(b) + at(e) - at(g)));
+      const Point<d> left = inertia - load + contact_here + at(b) + at(e) - at(g);
+      if (clamped_[node])
+        force.add(position, -left);
+      else
+        raise(motion, left.cwiseAbs().maxCoeff());
+      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs() + at(g).cwiseAbs();
+      raise(motion_size, (rho / k * (at(m1).cwiseAbs() + at(m0).cwiseAbs()) + given + internal).maxCoeff());
+      raise(applied, given.maxCoeff());
+      raise(forces_here, (given + at(e).cwiseAbs() + at(b).cwiseAbs()).maxCoeff());
+      raise(internal_size, internal.maxCoeff());
       const double storage = ((*t1)[i] - (*t0)[i]) / k, exchange = (*x)[i], source = (*q)[i] + (*h)[i];
       content += storage + exchange - source;
       content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
       const double within = conduction_rows_[i] * theta + (std::abs((*t1)[i]) + std::abs((*t0)[i])) / k;
       heat_rounding += within * within;
+      const double wall = storage + exchange - source + (*flux)[i];
       if (cooled_[node]) {
-        const double wall = storage + exchange - source + (*flux)[i];
         content -= wall;
         content_size += std::abs(wall);
+      } else {
+        raise(heat_left, std::abs(wall));
       }
+      raise(heat_size, within + std::abs(exchange) + std::abs((*q)[i]) + std::abs((*h)[i]));
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
@@ -227,7 +253,14 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
     l.force_residual = std::max(l.force_residual, i < d ? unexplained(sums[i], forces, force_rounding)
                                                         : unexplained(sums[i], moments, moment_rounding));
   const double heat = unexplained(layout_.sum(content), layout_.sum(content_size), layout_.sum(heat_rounding));
-  l.heat_residual = std::max(heat_energy, heat);
+  // sums say nothing about the equations behind them: those of all free nodes hold as well, in size relative to the
+  // largest
+  MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(most.size()), MPI_DOUBLE, MPI_MAX, layout_.comm());
+  l.force_residual = std::max(l.force_residual, relative(most[motion], {most[motion_size]}));
+  l.heat_residual = std::max({heat_energy, heat, relative(most[heat_left], {most[heat_size]})});
+  // without any load there is nothing a strain of rounding could be mistaken for
+  if (most[applied] > 0)
+    l.force_floor = std::numeric_limits<double>::epsilon() * relative(most[internal_size], {most[forces_here]});
 }
 
 template <int d>

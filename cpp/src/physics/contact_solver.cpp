@@ -24,7 +24,9 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double terms =
         along(point.displacement) + std::abs(point.gap) +
         problem.step * (along(velocity.template segment<d>(at)) + along(problem.free.template segment<d>(at)));
-    rounding = std::max(rounding, 4 * eps * point.weight * problem.law.compliance.stiffness * terms);
+    const double blur =
+        4 * eps * terms;  // what rounding makes of r; a point that is open all the same has no part in it
+    if (r > -blur) rounding = std::max(rounding, point.weight * problem.law.compliance.stiffness * blur);
   }
   *floor = std::numeric_limits<double>::infinity();
   if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))

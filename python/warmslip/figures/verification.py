@@ -65,6 +65,8 @@ def verdicts(inputs: list[Path]) -> tuple[Figure, str]:
         middle, half = (low + high) / 2, (high - low) / 2
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(half > 0, np.abs(seen - middle) / half, np.where(seen == middle, 0.0, np.inf))
+        # a band that is open above: how near its lower edge, as a share
+        share = np.where(np.isposinf(high), np.where(seen > 0, low / np.where(seen > 0, seen, 1.0), np.inf), share)
         # sizes that should vanish have 0 at the edge of their band: how much of the bound they use says more
         share = np.where(low == 0, seen / np.where(high > 0, high, 1.0), share)
         good = np.array([line["verdict"] == "pass" for line in own])
@@ -73,7 +75,10 @@ def verdicts(inputs: list[Path]) -> tuple[Figure, str]:
         ax.semilogx(x[good], y + jitter[good], "o", ms=3, color="#0072b2", alpha=0.6, mew=0)
         ax.semilogx(x[~good], y + jitter[~good], "X", ms=7, color="#d55e00")
     ax.axvline(1, color=GREY, lw=1)
-    ax.set(xlabel="distance from the expected value, in half-widths of the band (1: its edge)", xlim=(5e-7, 20))
+    ax.set(
+        xlabel="distance from the middle of the band, in half-widths (1: its edge); of a bound, the share used",
+        xlim=(5e-7, 20),
+    )
     ax.set_yticks(range(len(topics)), topics)
     ax.invert_yaxis()
     failed = sum(line["verdict"] != "pass" for line in lines)

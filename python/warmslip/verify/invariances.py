@@ -191,8 +191,15 @@ def lines(name: str, scene: Scene) -> list[Line]:
     for _ in job.steps():
         pass
     state(job)
+    stated = {"energy": job.floors["energy_floor"], "law": job.floors["law_floor"]}  # what rounding of the law explains
     out = [
-        below(name, f"the {identity} balance closes at every step", "identity", worst, ROUND_OFF + job.floor)
+        below(
+            name,
+            f"the {identity} balance closes at every step",
+            "identity",
+            worst,
+            ROUND_OFF + stated.get(identity, 0.0),
+        )
         for identity, worst in job.worst.items()
     ]
     checks: dict[str, Callable[[], float]] = {

@@ -58,18 +58,33 @@ def audits(paths: Sequence[Path]) -> Iterator[str]:
         yield row(topic, statement, *cells)
 
 
-def faults(path: Path) -> Iterator[str]:
-    """The score of the seeded faults, what kills most of them, and every survivor with the reason."""
-    table = read(path)
-    killers = Counter(r["by"].split("::")[0].split("[")[0] for r in table if r["outcome"] == "killed")
-    killed, survivors = killers.total(), [r for r in table if r["outcome"] != "killed"]
-    yield f"\n## seeded faults\n\n**{killed} of {len(table)} killed ({100 * killed / len(table):.1f} %)** by the fast tests "
-    yield f"(`make mutants`); which check kills which fault is in [{path.name}]({path.name}).\n\n"
-    yield row("first to fail", "faults") + "| --- | --- |\n"
-    yield from (row(name, str(count)) for name, count in killers.most_common())
-    if survivors:
-        yield "\n" + row("survivor", "what it does", "why no check can fail") + "| --- | --- | --- |\n"
-        yield from (row(r["fault"], r["what"], r["by"] or "**unexplained**") for r in survivors)
+def faults(path: Path) -> tuple[list[str], bool]:
+    """The score of the seeded faults, what kills most of them, and every other with the reason; whether all is explained.
+
+    `control` is no fault: where it does not survive, or where fewer than 95 per cent are killed, not all is well.
+    """
+    rows = {r["fault"]: r for r in read(path)}
+    control = rows.pop("control", None)
+    tried = [r for r in rows.values() if r["outcome"] != "untried"]
+    killers = Counter(r["by"].split("::")[0].split("[")[0] for r in tried if r["outcome"] == "killed")
+    killed, others = killers.total(), [r for r in tried if r["outcome"] != "killed"]
+    sound = control is None or control["outcome"] in ("survived", "untried")
+    good = sound and killed >= 0.95 * len(tried) and all(r["outcome"] == "survived" and r["by"] for r in others)
+    share = f"{100 * killed / len(tried):.1f} %" if tried else "none tried"
+    out = [f"\n## seeded faults\n\n**{killed} of {len(tried)} killed ({share})** by the fast tests (`make mutants`)"]
+    if len(tried) < len(rows):
+        out.append(f", {len(rows) - len(tried)} not tried yet")
+    out.append(f"; which check kills which fault is in [{path.name}]({path.name}).\n\n")
+    if not sound:
+        out.append("**A change that changes nothing did not survive: the score means nothing.**\n\n")
+    out.append(row("first to fail", "faults") + "| --- | --- |\n")
+    out += [row(name, str(count)) for name, count in killers.most_common()]
+    if others:
+        out.append("\n" + row("not killed", "what it does", "why no check can fail") + "| --- | --- | --- |\n")
+        for r in others:
+            why = r["by"] if r["outcome"] == "survived" else f"**{r['outcome']}**: {r['by']}"
+            out.append(row(r["fault"], r["what"], why or "**unexplained**"))
+    return out, good
 
 
 def markdown(
@@ -100,7 +115,9 @@ def markdown(
     if audited:
         out += audits(audited)
     if seeded:
-        out += faults(seeded)
+        text, explained = faults(seeded)
+        out += text
+        wrong += not explained
     for name, rows in topics.items():
         out.append(f"\n## {name}\n\n{titles[name]}\n\n")
         out.append(

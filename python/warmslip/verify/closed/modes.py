@@ -84,7 +84,9 @@ def recursion() -> list[Line]:
         wrong["w"] = max(wrong["w"], bench.worst(w, np.tensordot(b, modes, 1), speed))
     name = "three modes, 50 steps"
     return [
-        below(name, f"{part} follows backward Euler's recursion", "analytic", error, bench.ROUND_OFF)
+        below(
+            name, f"{part} follows backward Euler's recursion in the body's own modes", "theory", error, bench.ROUND_OFF
+        )
         for part, error in wrong.items()
     ]
 
