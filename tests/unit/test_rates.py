@@ -94,6 +94,7 @@ def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> l
         row |= dict.fromkeys(
             ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2"), larger
         )
+        row |= {"safeguarded_steps": 0, "refinements": 9 if n > 64 else 0}
         rows.append(row | {f"identity_{i}": 1e-15 for i in IDENTITIES})
     return rows
 
@@ -188,6 +189,9 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
     assert spoil(outcome="contact_not_converged") == ["case runs that did not end right"]
     assert spoil(identity_law=1e-10) == ["case law identity"]
     assert spoil(identity_heat=math.nan) == ["case heat identity"]
+    assert spoil(safeguarded_steps=4) == []  # of 496
+    assert spoil(safeguarded_steps=5) == ["case share of safeguarded steps"]
+    assert spoil(refinements=1) == ["case refined steps on h >= 1/64"]
 
 
 def test_a_verdict_needs_something_to_judge(tmp_path: Path) -> None:
