@@ -145,6 +145,7 @@ class Tree:
         environment = self.at / ".venv"
         environment.unlink(missing_ok=True)
         environment.symlink_to(sys.prefix)
+        shutil.rmtree(self.at / ".snakemake", ignore_errors=True)  # of a run that was ended
         result = self._run(
             *("bash", "-c", ". workflows/env.sh && exec snakemake judged --cores 2 --keep-going --configfile $0"),
             "workflows/config/ci.yaml",
