@@ -39,7 +39,10 @@ def _levels(text: str) -> list[int]:
 def _writable(out: Path) -> Path:
     """`out`, whose folder is there now: nothing is computed for a file that cannot be written. Raises OSError."""
     out.parent.mkdir(parents=True, exist_ok=True)
+    there = out.exists()
     out.open("a").close()
+    if not there:
+        out.unlink()  # an interrupted run leaves no empty table
     return out
 
 

@@ -145,7 +145,8 @@ class Tree:
         environment = self.at / ".venv"
         environment.unlink(missing_ok=True)
         environment.symlink_to(sys.prefix)
-        shutil.rmtree(self.at / ".snakemake", ignore_errors=True)  # of a run that was ended
+        for leftover in (".snakemake", "results/runs"):  # of a run that was ended
+            shutil.rmtree(self.at / leftover, ignore_errors=True)
         result = self._run(
             *("bash", "-c", ". workflows/env.sh && exec snakemake judged --cores 2 --keep-going --configfile $0"),
             "workflows/config/ci.yaml",
