@@ -4,8 +4,9 @@ Energy that must not grow is watched without loads; a step that has one answer i
 orders that are entitled are measured between successive grids. |u_h - u_h/2| is C h^p (1 - 2^-p) for an error C h^p, so
 their ratio has no bias: no solution stands in for the exact one. Numbers are dimensionless.
 
-|w|_L2 is left out for the cold foundation: its error is that of a layer of width sqrt(mu_1 k) at the start, which is as wide as
-the body on these grids (0.28 for k = 1/128), so that no order can be seen yet.
+|w|_L2 is left out: its error is that of a layer of width sqrt(mu_1 k) at the start, which is as wide as the body on these grids
+(0.28 for k = 1/128). No order is to be seen yet: -0.2 to 0.9 was measured, 0.4 for `isotropic` on the hot foundation. Where the
+layer is thin the order 3/4 is measured by tests/verification/test_audit.py.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ READINGS = ("printed", "mixed", "isotropic", "consistent")
 ROUNDING = 1e-12  # of the energy at the start
 AGREEMENT = 1e-7  # of two answers of one step whose laws are met to 1e-10
 LEVELS = (64, 128)  # each against its double
-TERMS = {0.0: ("u_V", "theta_L2"), 10.0: ("u_V", "w_L2", "theta_L2")}  # by theta_F
+TERMS, THETAS = ("u_V", "theta_L2"), (0.0, 10.0)
 
 
 def energy(job: Run, g: float) -> float:
@@ -95,7 +96,7 @@ def other_answer(scene: Scene) -> float:
 def orders(scene: Scene, levels: tuple[int, int] = LEVELS) -> dict[str, float]:
     """The order of each term between successive grids h = k = 1/n, each measured against its double."""
     coarse, fine = (study(scene, levels=[n], reference=2 * n)[0] for n in levels)
-    return {term: observed(coarse[f"e_{term}"], fine[f"e_{term}"]) for term in ("u_V", "w_L2", "theta_L2")}
+    return {term: observed(coarse[f"e_{term}"], fine[f"e_{term}"]) for term in TERMS}
 
 
 def lines(reading: str, levels: tuple[int, int] = LEVELS) -> Iterator[Line]:
@@ -113,10 +114,10 @@ def lines(reading: str, levels: tuple[int, int] = LEVELS) -> Iterator[Line]:
     what = "Newton's answer is the one of projected gradients from the forces of another problem"
     yield below(f"{reading}, one answer a step", what, "theory", other_answer(scene), AGREEMENT)
     singular = find(found, "(H3)").holds != "yes"
-    for theta, terms in TERMS.items():
+    for theta in THETAS:
         one = scene.override(**{"contact.heat_exchange.foundation_temperature": theta})
         seen = orders(one, levels)
-        for term in terms:
+        for term in TERMS:
             owed = entitled(term, hot=theta > 0, singular_conductivity=singular, viscosity=one.viscosity.pair(2))
             case = f"{reading}, theta_F = {theta:g}, {term}, h = k = 1/{levels[0]} to 1/{2 * levels[1]}"
             what = "the order between successive grids is at least the entitled one"
