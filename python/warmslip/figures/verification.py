@@ -32,14 +32,14 @@ def graded(inputs: list[Path]) -> tuple[Figure, str]:
             orders = ", ".join(f"{p:.2f}" for p in column(lines, f"order_{term}")[1:])
             parts.append(f"{term} {number(float(true[0]))} to {number(float(true[-1]))} (orders {orders})")
         ax.set(xlabel="$h$", title=title)
-        ax.xaxis.set_major_locator(FixedLocator(h.tolist()))
+        ax.xaxis.set_major_locator(FixedLocator(sorted(set(column(table, "h").tolist()))))  # both panels share it
         ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter(lambda value, _: f"1/{1 / value:.0f}")
         grid_lines(ax)
         said.append(f"{kind.capitalize()}: {'; '.join(parts)}.")
     low, high = axes[0].get_ylim()
     for ax in axes:
-        triangle(ax, h[0] / 2.4, h[0] / 1.2, low * 1.3)
+        triangle(ax, h[0] / 2.4, h[0] / 1.2, low * 2)
     axes[0].set(ylim=(low, high), ylabel="error, largest over time")
     names = [Line2D([], [], color=colour, marker=marker, label=label) for label, colour, marker in TERMS.values()]
     extra = [
