@@ -189,8 +189,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help=f"a CSV of what was found (all: {TABLE.relative_to(ROOT)})")
     options = parser.parse_args()
     chosen = [f for f in faults() if not options.names or f.name in options.names]
-    if options.handful:
-        chosen = handful(chosen, options.handful)
+    if options.handful:  # of those that the table says were killed: a survivor means that the tests have got worse
+        before = read(TABLE)
+        known = [f for f in chosen if f.name in before and before[f.name].outcome == "killed"]
+        chosen = handful(known or chosen, options.handful)
     elif not options.names:
         options.out = options.out or TABLE
     if unknown := set(options.names) - {f.name for f in chosen}:
