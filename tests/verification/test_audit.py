@@ -52,6 +52,7 @@ def test_what_is_known_of_the_paper(reading: str) -> None:
     assert adiabatic["smallest eigenvalue"] == pytest.approx(kept, rel=1e-12)
     assert adiabatic.holds == ("no" if kept < 0 else "yes")
     assert find(found, "coupling, sign").holds == ("yes" if reading == "consistent" else "no")
+    assert find(found, "coupling, sign")["c"] == pytest.approx(1 if reading == "consistent" else -1)  # R = -c M
     assert find(found, "coupling, energy").holds == "yes"
     for x in (0.0, 1.0):
         top, bottom = find(found, f"corner ({x:g}, 1)"), find(found, f"corner ({x:g}, 0)")
