@@ -30,19 +30,18 @@ void bind(py::module_& m) {
       .def("v", &N::v, py::arg("vec"), "|v|_V = |eps(v)|_L2 of a displacement (collective).");
 
   using O = Operators<d>;
-  auto operators =
-      py::class_<O, std::shared_ptr<O>>(m, name<d>("Operators").c_str(),
-                                        "The constant matrices as petsc4py objects, without boundary conditions.")
-          .def(py::init<const L&, const Problem<d>&>(), py::arg("layout"), py::arg("problem"))
-          .def_readonly("clamped", &O::clamped, "Global scalar indices with u = 0 owned by this rank.")
-          .def_readonly("cooled", &O::cooled, "Global nodes with theta = 0 owned by this rank.");
+  auto operators = py::class_<O, std::shared_ptr<O>>(
+                       m, name<d>("Operators").c_str(),
+                       "The constant matrices as petsc4py objects, without boundary conditions; None is absent.")
+                       .def(py::init<const L&, const Problem<d>&>(), py::arg("layout"), py::arg("problem"))
+                       .def_readonly("clamped", &O::clamped, "Global scalar indices with u = 0 owned by this rank.")
+                       .def_readonly("cooled", &O::cooled, "Global nodes with theta = 0 owned by this rank.");
   const auto matrix = [&](const char* attribute, MatHandle O::*member, const char* doc) {
     operators.def_property_readonly(
         attribute, [member](const O& o) { return share(o.*member); }, doc);
   };
-  matrix("mass", &O::mass, "(theta, eta)");
-  matrix("vector_mass", &O::vector_mass,
-         "(w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries");
+  matrix("mass", &O::mass, "(theta, eta), times the capacity");
+  matrix("inertia", &O::inertia, "rho (w, v), of PETSc's type MAIJ; convert('aij') has its entries");
   matrix("elasticity", &O::elasticity, "a(u, v)");
   matrix("viscosity", &O::viscosity, "b(w, v)");
   matrix("conductivity", &O::conductivity, "d(theta, eta)");
@@ -67,6 +66,14 @@ void bind(py::module_& m) {
           "normals", [](const S& s) { return s.normals(); }, "(points, d), outward unit normals")
       .def_property_readonly(
           "weights", [](const S& s) { return s.weights(); }, "(points), area")
+      .def_property_readonly(
+          "contacts",
+          [](const S& s) {
+            std::vector<std::size_t> parts;
+            for (Eigen::Index i = 0; i < s.points(); ++i) parts.push_back(s.contact(i));
+            return parts;
+          },
+          "(points), which of the problem's contact parts a point lies on")
       .def_property_readonly("nodes", &S::nodes, "Number of contact nodes.")
       .def("unknowns", &S::unknowns, py::arg("block"), "Global scalar indices of the contact unknowns, (d nodes).");
 

@@ -6,45 +6,81 @@ namespace {
 
 template <int d>
 void bind(py::module_& m) {
-  py::class_<Material<d>>(m, name<d>("Material").c_str(),
-                          "Density and the constant tensors of (2.1)-(2.4); fourth-order ones in Mandel form.")
-      .def(py::init<double, Tensor4<d>, Tensor4<d>, Tensor2<d>, Tensor2<d>, Tensor2<d>>(), py::kw_only(),
-           py::arg("density"), py::arg("elasticity"), py::arg("viscosity"), py::arg("conductivity"),
-           py::arg("expansion"), py::arg("heating"))
-      .def_readonly("density", &Material<d>::density)
-      .def_readonly("elasticity", &Material<d>::elasticity)
-      .def_readonly("viscosity", &Material<d>::viscosity)
-      .def_readonly("conductivity", &Material<d>::conductivity)
-      .def_readonly("expansion", &Material<d>::expansion)
-      .def_readonly("heating", &Material<d>::heating);
-  py::class_<Problem<d>, std::shared_ptr<Problem<d>>>(m, name<d>("Problem").c_str(),
-                                                      "A mesh with material, supports and contact part.")
-      .def(py::init([](std::shared_ptr<Mesh<d>> mesh, const Material<d>& material, std::vector<std::string> clamped,
-                       std::vector<std::string> cooled, std::string contact_part, double stiffness, double friction,
-                       int quadrature, double conductance) {
-             return std::make_shared<Problem<d>>(Problem<d>{std::move(mesh),
-                                                            material,
-                                                            std::move(clamped),
-                                                            std::move(cooled),
-                                                            std::move(contact_part),
-                                                            {{stiffness}, {friction}},
-                                                            {quadrature},
-                                                            conductance});
-           }),
-           py::kw_only(), py::arg("mesh"), py::arg("material"), py::arg("clamped"), py::arg("cooled"),
-           py::arg("contact_part"), py::arg("stiffness"), py::arg("friction"), py::arg("quadrature"),
-           py::arg("conductance"),
-           "`clamped` and `cooled` are part names with u = 0 and theta = 0; quadrature 0 is nodal, n Gauss's with n "
-           "points.")
-      .def_property_readonly("mesh", [](const Problem<d>& p) { return std::const_pointer_cast<Mesh<d>>(p.mesh); })
-      .def_readonly("material", &Problem<d>::material);
-  m.def("stress", &stress<d>, py::arg("mesh"), py::arg("material"), py::arg("u"), py::arg("w"), py::arg("theta"),
-        "Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes).");
+  using M = Material<d>;
+  using Four = std::optional<Tensor4<d>>;
+  using Two = std::optional<Tensor2<d>>;
+  py::class_<M>(m, name<d>("Material").c_str(),
+                "Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.")
+      .def(py::init<double, Four, Four, Two, Two, Two, double>(), py::kw_only(), py::arg("density"),
+           py::arg("elasticity"), py::arg("viscosity"), py::arg("conductivity"), py::arg("expansion"),
+           py::arg("heating"), py::arg("capacity"))
+      .def_readonly("density", &M::density)
+      .def_readonly("elasticity", &M::elasticity)
+      .def_readonly("viscosity", &M::viscosity)
+      .def_readonly("conductivity", &M::conductivity)
+      .def_readonly("expansion", &M::expansion)
+      .def_readonly("heating", &M::heating)
+      .def_readonly("capacity", &M::capacity);
+  using P = Problem<d>;
+  py::class_<P, std::shared_ptr<P>>(m, name<d>("Problem").c_str(), "A mesh with materials, supports and contact parts.")
+      .def(
+          py::init([](std::shared_ptr<Mesh<d>> mesh, std::vector<M> materials, std::vector<int> regions,
+                      std::vector<std::string> clamped, std::vector<std::string> cooled,
+                      std::vector<ContactPart> contacts) {
+            return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions), std::move(clamped),
+                                         std::move(cooled), std::move(contacts)});
+          }),
+          py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("clamped"),
+          py::arg("cooled"), py::arg("contacts"),
+          "`regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.")
+      .def_property_readonly("mesh", [](const P& p) { return std::const_pointer_cast<Mesh<d>>(p.mesh); })
+      .def_readonly("materials", &P::materials)
+      .def_property_readonly(
+          "material", [](const P& p) { return p.materials.front(); }, "the first one")
+      .def_property_readonly("moves", &P::moves, "Whether there is a velocity to solve for.")
+      .def_property_readonly("conducts", &P::conducts, "Whether there is a temperature to solve for.");
+  m.def("stress", &stress<d>, py::arg("problem"), py::arg("u"), py::arg("w"), py::arg("theta"),
+        "Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a "
+        "field the problem does not have may be empty.");
 }
 
 }  // namespace
 
 void bind_problem(py::module_& m) {
+  using Pressure = std::function<std::array<double, 3>(double)>;
+  using Bound = std::function<std::array<double, 3>(double, double)>;
+  py::class_<NormalCompliance>(m, "NormalCompliance", "p_nu(r) = min(stiffness max(r, 0)^exponent, most) (2.8).")
+      .def(py::init<double, double, double, Pressure>(), py::kw_only(), py::arg("stiffness"), py::arg("exponent"),
+           py::arg("most"), py::arg("custom"),
+           "`custom`, when not None, takes its place: r > 0 to (pressure, derivative, energy).")
+      .def("pressure", &NormalCompliance::pressure, py::arg("penetration"))
+      .def("energy", &NormalCompliance::energy, py::arg("penetration"))
+      .def_readonly("stiffness", &NormalCompliance::stiffness);
+  py::class_<Friction>(m, "Friction", "|sigma_tau| <= min(cohesion + mu(|w_tau|) p_nu, limit) (2.9).")
+      .def(py::init<double, double, double, double, double, double, Bound>(), py::kw_only(), py::arg("coefficient"),
+           py::arg("cohesion"), py::arg("limit"), py::arg("kinetic"), py::arg("speed"), py::arg("regularisation"),
+           py::arg("custom"),
+           "`custom`, when not None, takes its place: (pressure, speed) to (bound, derivative by pressure, by speed).")
+      .def(
+          "bound", [](const Friction& f, double pressure, double speed) { return f.bound(pressure, speed).value; },
+          py::arg("pressure"), py::arg("speed"));
+  py::class_<ContactLaw>(m, "ContactLaw")
+      .def(py::init<NormalCompliance, Friction>(), py::kw_only(), py::arg("compliance"), py::arg("friction"))
+      .def_readonly("compliance", &ContactLaw::compliance)
+      .def_readonly("friction", &ContactLaw::friction);
+  py::class_<ContactPart>(m, "ContactPart", "One part of Gamma_C; without a law it only exchanges heat.")
+      .def(py::init([](std::string part, std::optional<ContactLaw> law, int quadrature, double conductance,
+                       double per_pressure, double friction_share) {
+             return ContactPart{
+                 std::move(part), std::move(law), {quadrature}, conductance, {per_pressure, friction_share}};
+           }),
+           py::kw_only(), py::arg("part"), py::arg("law"), py::arg("quadrature"), py::arg("conductance"),
+           py::arg("per_pressure"), py::arg("friction_share"),
+           "quadrature 0 is nodal, n Gauss's with n points; q . nu = (conductance + per_pressure p_nu) (theta - "
+           "theta_F) "
+           "- friction_share |sigma_tau . w_tau|.")
+      .def_readonly("part", &ContactPart::part)
+      .def_readonly("law", &ContactPart::law);
   bind<2>(m);
   bind<3>(m);
 }

@@ -21,6 +21,7 @@ void bind(py::module_& m) {
       .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
       .def_readonly("ledger", &R::ledger);
 
+  using Maybe = std::optional<Vec>;
   using S = Stepper<d>;
   py::class_<S, std::shared_ptr<S>>(m, name<d>("Stepper").c_str(), "Backward Euler with a fixed step (collective).")
       .def(py::init([](const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
@@ -32,13 +33,33 @@ void bind(py::module_& m) {
            py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("surface"), py::kw_only(), py::arg("k"),
            py::arg("coupling"), py::arg("backend"), py::arg("contact"), py::keep_alive<1, 2>(), py::keep_alive<1, 3>(),
            py::keep_alive<1, 4>(), py::keep_alive<1, 5>())
-      .def("start", &S::start, py::arg("u"), py::arg("w"), py::arg("theta"), py::arg("gap"), py::arg("time"))
+      .def(
+          "start",
+          [](S& s, const Maybe& u, const Maybe& w, const Maybe& theta, const Eigen::VectorXd& gap, double time) {
+            s.start(u.value_or(nullptr), w.value_or(nullptr), theta.value_or(nullptr), gap, time);
+          },
+          py::arg("u"), py::arg("w"), py::arg("theta"), py::arg("gap"), py::arg("time"),
+          "Sets the state; None for a field the problem does not have.")
+      .def(
+          "resume",
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status) {
+            std::vector<Status> statuses;
+            for (const int one : status) statuses.push_back(static_cast<Status>(one));
+            s.resume(force, statuses);
+          },
+          py::arg("contact_force"), py::arg("status"),
+          "After `start`: the contact points of the step before, for the same next step to the last bit.")
+      .def("forget", &S::forget, "Drops what is remembered of earlier steps beside the state.")
       .def(
           "advance",
-          [](S& s, Vec force, Vec heat, const Eigen::VectorXd& gap) {
-            return s.advance({force, heat, gap});
+          [](S& s, const Maybe& force, const Maybe& heat, const Eigen::VectorXd& gap, const Maybe& velocity,
+             const Maybe& temperature, const Eigen::VectorXd& foundation) {
+            return s.advance({force.value_or(nullptr), heat.value_or(nullptr), gap, velocity.value_or(nullptr),
+                              temperature.value_or(nullptr), foundation});
           },
-          py::arg("force"), py::arg("heat"), py::arg("gap"), "One step; the state stays when the outcome is not right.")
+          py::arg("force"), py::arg("heat"), py::arg("gap"), py::arg("support_velocity") = py::none(),
+          py::arg("support_temperature") = py::none(), py::arg("foundation") = Eigen::VectorXd(),
+          "One step; the state stays when the outcome is not right. See StepLoads.")
       .def_property_readonly(
           "u", [](const S& s) { return share(s.level().u); },
           "Displacement. The vectors change owner at every step: ask again.")
@@ -61,8 +82,7 @@ void bind(py::module_& m) {
           "0 open, 1 stick, 2 slip, a point")
       .def_property_readonly("cost", &S::cost)
       .def_property_readonly(
-          "momentum_factor", [](S& s) -> Factor& { return s.momentum_factor(); },
-          py::return_value_policy::reference_internal)
+          "momentum_factor", [](S& s) { return s.momentum_factor(); }, py::return_value_policy::reference_internal)
       .def_property_readonly(
           "heat_factor", [](S& s) { return s.heat_factor(); }, py::return_value_policy::reference_internal)
       .def_property_readonly("solver", &S::solver, "The factorizations in words.");
@@ -115,12 +135,15 @@ void bind_stepper(py::module_& m) {
   term("load_work", &Ledger::load_work);
   term("expansion_work", &Ledger::expansion_work);
   term("gap_work", &Ledger::gap_work);
+  term("support_work", &Ledger::support_work);
   term("heat_change", &Ledger::heat_change);
   term("heat_damping", &Ledger::heat_damping);
   term("conducted", &Ledger::conducted);
   term("exchanged", &Ledger::exchanged);
   term("supplied", &Ledger::supplied);
   term("heating", &Ledger::heating);
+  term("friction_heating", &Ledger::friction_heating);
+  term("held", &Ledger::held);
   term("energy_residual", &Ledger::energy_residual);
   term("heat_residual", &Ledger::heat_residual);
   term("force_residual", &Ledger::force_residual);

@@ -3,6 +3,7 @@
 #include "petsc_caster.hpp"
 // after the casters
 #include <pybind11/eigen.h>
+#include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
 #include <string>
@@ -28,7 +29,7 @@ std::string name(const char* base) {
 /// A second owner of a handle that stays ours: the caster gives the reference away.
 template <class T, auto destroy>
 T share(const Handle<T, destroy>& handle) {
-  WARMSLIP_PETSC(PetscObjectReference(reinterpret_cast<PetscObject>(static_cast<T>(handle))));
+  if (handle) WARMSLIP_PETSC(PetscObjectReference(reinterpret_cast<PetscObject>(static_cast<T>(handle))));
   return handle;
 }
 

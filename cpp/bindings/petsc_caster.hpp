@@ -32,7 +32,7 @@ struct Comm {
 namespace pybind11::detail {
 
 // An argument is borrowed: it lives as long as the Python object. A returned handle is given away: Python takes over
-// the caller's reference.
+// the caller's reference. A null handle becomes None.
 template <class Handle, class Traits>
 struct petsc_caster {
   bool load(handle source, bool /*convert*/) {
@@ -47,6 +47,7 @@ struct petsc_caster {
   }
 
   static handle cast(Handle source, return_value_policy /*policy*/, handle /*parent*/) {
+    if (!source) return none().release();
     static auto* const make = petsc4py::capi<PyObject*(Handle)>(Traits::maker);
     PyObject* object = make(source);  // holds a reference of its own
     if (object) PetscObjectDereference(reinterpret_cast<PetscObject>(source));

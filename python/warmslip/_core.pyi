@@ -122,82 +122,166 @@ class Mesh3:
         """
         Facets (f, d) of every named boundary part.
         """
-class Material2:
+class NormalCompliance:
     """
-    Density and the constant tensors of (2.1)-(2.4); fourth-order ones in Mandel form.
+    p_nu(r) = min(stiffness max(r, 0)^exponent, most) (2.8).
     """
-    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"]) -> None:
+    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex, exponent: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[typing.SupportsFloat | typing.SupportsIndex], typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]] | None) -> None:
+        """
+        `custom`, when not None, takes its place: r > 0 to (pressure, derivative, energy).
+        """
+    def energy(self, penetration: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    def pressure(self, penetration: typing.SupportsFloat | typing.SupportsIndex) -> float:
         ...
     @property
-    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+    def stiffness(self) -> float:
+        ...
+class Friction:
+    """
+    |sigma_tau| <= min(cohesion + mu(|w_tau|) p_nu, limit) (2.9).
+    """
+    def __init__(self, *, coefficient: typing.SupportsFloat | typing.SupportsIndex, cohesion: typing.SupportsFloat | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, kinetic: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex, regularisation: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]] | None) -> None:
+        """
+        `custom`, when not None, takes its place: (pressure, speed) to (bound, derivative by pressure, by speed).
+        """
+    def bound(self, pressure: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+class ContactLaw:
+    def __init__(self, *, compliance: NormalCompliance, friction: Friction) -> None:
+        ...
+    @property
+    def compliance(self) -> NormalCompliance:
+        ...
+    @property
+    def friction(self) -> Friction:
+        ...
+class ContactPart:
+    """
+    One part of Gamma_C; without a law it only exchanges heat.
+    """
+    def __init__(self, *, part: str, law: ContactLaw | None, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex, per_pressure: typing.SupportsFloat | typing.SupportsIndex, friction_share: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        quadrature 0 is nodal, n Gauss's with n points; q . nu = (conductance + per_pressure p_nu) (theta - theta_F) - friction_share |sigma_tau . w_tau|.
+        """
+    @property
+    def law(self) -> ContactLaw | None:
+        ...
+    @property
+    def part(self) -> str:
+        ...
+class Material2:
+    """
+    Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.
+    """
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def capacity(self) -> float:
+        ...
+    @property
+    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"] | None:
         ...
     @property
     def density(self) -> float:
         ...
     @property
-    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
-    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"] | None:
         ...
     @property
-    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"] | None:
         ...
     @property
-    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
 class Problem2:
     """
-    A mesh with material, supports and contact part.
+    A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh2, material: Material2, clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contact_part: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, friction: typing.SupportsFloat | typing.SupportsIndex, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart]) -> None:
         """
-        `clamped` and `cooled` are part names with u = 0 and theta = 0; quadrature 0 is nodal, n Gauss's with n points.
+        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.
+        """
+    @property
+    def conducts(self) -> bool:
+        """
+        Whether there is a temperature to solve for.
         """
     @property
     def material(self) -> Material2:
+        """
+        the first one
+        """
+    @property
+    def materials(self) -> list[Material2]:
         ...
     @property
     def mesh(self) -> Mesh2:
         ...
+    @property
+    def moves(self) -> bool:
+        """
+        Whether there is a velocity to solve for.
+        """
 class Material3:
     """
-    Density and the constant tensors of (2.1)-(2.4); fourth-order ones in Mandel form.
+    Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.
     """
-    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None:
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    def capacity(self) -> float:
+        ...
+    @property
+    def conductivity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
     def density(self) -> float:
         ...
     @property
-    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+    def elasticity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"] | None:
         ...
     @property
-    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    def expansion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
-    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
-    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+    def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"] | None:
         ...
 class Problem3:
     """
-    A mesh with material, supports and contact part.
+    A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh3, material: Material3, clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contact_part: str, stiffness: typing.SupportsFloat | typing.SupportsIndex, friction: typing.SupportsFloat | typing.SupportsIndex, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart]) -> None:
         """
-        `clamped` and `cooled` are part names with u = 0 and theta = 0; quadrature 0 is nodal, n Gauss's with n points.
+        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.
+        """
+    @property
+    def conducts(self) -> bool:
+        """
+        Whether there is a temperature to solve for.
         """
     @property
     def material(self) -> Material3:
+        """
+        the first one
+        """
+    @property
+    def materials(self) -> list[Material3]:
         ...
     @property
     def mesh(self) -> Mesh3:
         ...
+    @property
+    def moves(self) -> bool:
+        """
+        Whether there is a velocity to solve for.
+        """
 class Layout2:
     """
     A mesh distributed over the ranks of a communicator.
@@ -247,7 +331,7 @@ class Norms2:
         """
 class Operators2:
     """
-    The constant matrices as petsc4py objects, without boundary conditions.
+    The constant matrices as petsc4py objects, without boundary conditions; None is absent.
     """
     def __init__(self, layout: Layout2, problem: Problem2) -> None:
         ...
@@ -257,9 +341,9 @@ class Operators2:
         Global scalar indices with u = 0 owned by this rank.
         """
     @property
-    def conductivity(self) -> petsc4py.PETSc.Mat:
+    def conductivity(self) -> petsc4py.PETSc.Mat | None:
         """
-        d(theta, eta)
+        d(theta, eta), times the capacity
         """
     @property
     def cooled(self) -> list[int]:
@@ -267,37 +351,37 @@ class Operators2:
         Global nodes with theta = 0 owned by this rank.
         """
     @property
-    def elasticity(self) -> petsc4py.PETSc.Mat:
+    def elasticity(self) -> petsc4py.PETSc.Mat | None:
         """
         a(u, v)
         """
     @property
-    def exchange(self) -> petsc4py.PETSc.Mat:
+    def exchange(self) -> petsc4py.PETSc.Mat | None:
         """
         int k_c theta eta over Gamma_C
         """
     @property
-    def expansion(self) -> petsc4py.PETSc.Mat:
+    def expansion(self) -> petsc4py.PETSc.Mat | None:
         """
         m(theta, v)
         """
     @property
-    def heating(self) -> petsc4py.PETSc.Mat:
+    def heating(self) -> petsc4py.PETSc.Mat | None:
         """
         e(w, eta)
         """
     @property
-    def mass(self) -> petsc4py.PETSc.Mat:
+    def mass(self) -> petsc4py.PETSc.Mat | None:
         """
-        (theta, eta)
-        """
-    @property
-    def vector_mass(self) -> petsc4py.PETSc.Mat:
-        """
-        (w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries
+        (theta, eta), times the capacity
         """
     @property
-    def viscosity(self) -> petsc4py.PETSc.Mat:
+    def inertia(self) -> petsc4py.PETSc.Mat | None:
+        """
+        rho (w, v), of PETSc's type MAIJ; convert('aij') has its entries
+        """
+    @property
+    def viscosity(self) -> petsc4py.PETSc.Mat | None:
         """
         b(w, v)
         """
@@ -310,6 +394,11 @@ class ContactSurface2:
     def unknowns(self, block: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         """
         Global scalar indices of the contact unknowns, (d nodes).
+        """
+    @property
+    def contacts(self) -> list[int]:
+        """
+        (points), which of the problem's contact parts a point lies on
         """
     @property
     def nodes(self) -> int:
@@ -403,7 +492,7 @@ class Norms3:
         """
 class Operators3:
     """
-    The constant matrices as petsc4py objects, without boundary conditions.
+    The constant matrices as petsc4py objects, without boundary conditions; None is absent.
     """
     def __init__(self, layout: Layout3, problem: Problem3) -> None:
         ...
@@ -413,7 +502,7 @@ class Operators3:
         Global scalar indices with u = 0 owned by this rank.
         """
     @property
-    def conductivity(self) -> petsc4py.PETSc.Mat:
+    def conductivity(self) -> petsc4py.PETSc.Mat | None:
         """
         d(theta, eta)
         """
@@ -423,37 +512,37 @@ class Operators3:
         Global nodes with theta = 0 owned by this rank.
         """
     @property
-    def elasticity(self) -> petsc4py.PETSc.Mat:
+    def elasticity(self) -> petsc4py.PETSc.Mat | None:
         """
         a(u, v)
         """
     @property
-    def exchange(self) -> petsc4py.PETSc.Mat:
+    def exchange(self) -> petsc4py.PETSc.Mat | None:
         """
         int k_c theta eta over Gamma_C
         """
     @property
-    def expansion(self) -> petsc4py.PETSc.Mat:
+    def expansion(self) -> petsc4py.PETSc.Mat | None:
         """
         m(theta, v)
         """
     @property
-    def heating(self) -> petsc4py.PETSc.Mat:
+    def heating(self) -> petsc4py.PETSc.Mat | None:
         """
         e(w, eta)
         """
     @property
-    def mass(self) -> petsc4py.PETSc.Mat:
+    def mass(self) -> petsc4py.PETSc.Mat | None:
         """
         (theta, eta)
         """
     @property
-    def vector_mass(self) -> petsc4py.PETSc.Mat:
+    def inertia(self) -> petsc4py.PETSc.Mat | None:
         """
-        (w, v) without the density, of PETSc's type MAIJ; convert('aij') has its entries
+        rho (w, v), of PETSc's type MAIJ; convert('aij') has its entries
         """
     @property
-    def viscosity(self) -> petsc4py.PETSc.Mat:
+    def viscosity(self) -> petsc4py.PETSc.Mat | None:
         """
         b(w, v)
         """
@@ -466,6 +555,11 @@ class ContactSurface3:
     def unknowns(self, block: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         """
         Global scalar indices of the contact unknowns, (d nodes).
+        """
+    @property
+    def contacts(self) -> list[int]:
+        """
+        (points), which of the problem's contact parts a point lies on
         """
     @property
     def nodes(self) -> int:
@@ -827,7 +921,7 @@ class Ledger:
     """
     Terms and relative residuals of the balances of one step.
     """
-    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor', 'energy_floor', 'force_floor')
+    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'support_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'friction_heating', 'held', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor', 'energy_floor', 'force_floor')
     @property
     def conducted(self) -> float:
         ...
@@ -905,6 +999,15 @@ class Ledger:
         ...
     @property
     def supplied(self) -> float:
+        ...
+    @property
+    def support_work(self) -> float:
+        ...
+    @property
+    def friction_heating(self) -> float:
+        ...
+    @property
+    def held(self) -> float:
         ...
     @property
     def viscous(self) -> float:
@@ -1006,12 +1109,22 @@ class Stepper2:
     """
     def __init__(self, layout: Layout2, problem: Problem2, operators: Operators2, surface: ContactSurface2, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec, heat: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> StepReport2:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...) -> StepReport2:
         """
-        One step; the state stays when the outcome is not right.
+        One step; the state stays when the outcome is not right. See StepLoads.
         """
-    def start(self, u: petsc4py.PETSc.Vec, w: petsc4py.PETSc.Vec, theta: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
+    def forget(self) -> None:
+        """
+        Drops what is remembered of earlier steps beside the state.
+        """
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        """
+        After `start`: the contact points of the step before, for the same next step to the last bit.
+        """
+    def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Sets the state; None for a field the problem does not have.
+        """
     @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
@@ -1026,10 +1139,10 @@ class Stepper2:
     def cost(self) -> Cost:
         ...
     @property
-    def heat_factor(self) -> Factor:
+    def heat_factor(self) -> Factor | None:
         ...
     @property
-    def momentum_factor(self) -> Factor:
+    def momentum_factor(self) -> Factor | None:
         ...
     @property
     def solver(self) -> str:
@@ -1042,7 +1155,7 @@ class Stepper2:
         0 open, 1 stick, 2 slip, a point
         """
     @property
-    def theta(self) -> petsc4py.PETSc.Vec:
+    def theta(self) -> petsc4py.PETSc.Vec | None:
         """
         Temperature.
         """
@@ -1050,12 +1163,12 @@ class Stepper2:
     def time(self) -> float:
         ...
     @property
-    def u(self) -> petsc4py.PETSc.Vec:
+    def u(self) -> petsc4py.PETSc.Vec | None:
         """
         Displacement. The vectors change owner at every step: ask again.
         """
     @property
-    def w(self) -> petsc4py.PETSc.Vec:
+    def w(self) -> petsc4py.PETSc.Vec | None:
         """
         Velocity.
         """
@@ -1115,12 +1228,22 @@ class Stepper3:
     """
     def __init__(self, layout: Layout3, problem: Problem3, operators: Operators3, surface: ContactSurface3, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec, heat: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> StepReport3:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...) -> StepReport3:
         """
-        One step; the state stays when the outcome is not right.
+        One step; the state stays when the outcome is not right. See StepLoads.
         """
-    def start(self, u: petsc4py.PETSc.Vec, w: petsc4py.PETSc.Vec, theta: petsc4py.PETSc.Vec, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
+    def forget(self) -> None:
+        """
+        Drops what is remembered of earlier steps beside the state.
+        """
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        """
+        After `start`: the contact points of the step before, for the same next step to the last bit.
+        """
+    def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Sets the state; None for a field the problem does not have.
+        """
     @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
@@ -1135,10 +1258,10 @@ class Stepper3:
     def cost(self) -> Cost:
         ...
     @property
-    def heat_factor(self) -> Factor:
+    def heat_factor(self) -> Factor | None:
         ...
     @property
-    def momentum_factor(self) -> Factor:
+    def momentum_factor(self) -> Factor | None:
         ...
     @property
     def solver(self) -> str:
@@ -1151,7 +1274,7 @@ class Stepper3:
         0 open, 1 stick, 2 slip, a point
         """
     @property
-    def theta(self) -> petsc4py.PETSc.Vec:
+    def theta(self) -> petsc4py.PETSc.Vec | None:
         """
         Temperature.
         """
@@ -1159,12 +1282,12 @@ class Stepper3:
     def time(self) -> float:
         ...
     @property
-    def u(self) -> petsc4py.PETSc.Vec:
+    def u(self) -> petsc4py.PETSc.Vec | None:
         """
         Displacement. The vectors change owner at every step: ask again.
         """
     @property
-    def w(self) -> petsc4py.PETSc.Vec:
+    def w(self) -> petsc4py.PETSc.Vec | None:
         """
         Velocity.
         """
@@ -1203,14 +1326,14 @@ def simplex_rule(dim: typing.SupportsInt | typing.SupportsIndex, points: typing.
     Barycentric points (q, dim+1) and weights (q), exact to degree 2 points - 1.
     """
 @typing.overload
-def stress(mesh: Mesh2, material: Material2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]:
+def stress(problem: Problem2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]:
     """
-    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes).
+    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a field the problem does not have may be empty.
     """
 @typing.overload
-def stress(mesh: Mesh3, material: Material3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]:
+def stress(problem: Problem3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]:
     """
-    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes).
+    Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a field the problem does not have may be empty.
     """
 compiler: str = 'g++ 12.2.0'
 petsc_version: str = '3.18.5'

@@ -138,7 +138,7 @@ def manufactured(
     from warmslip import manufactured as made
     from warmslip import study as studies
 
-    checked = scenes.load("paper_isotropic", set_)
+    checked = scenes.load("paper_isotropic", set_).full()
     _writable(out)
     rows = made.table(checked, ["staggered", "lagged", "monolithic"], _levels(levels), "h=k")
     rows += made.table(checked, ["staggered"], _levels(levels), "k=h^2")
@@ -157,7 +157,7 @@ def extremes(
     from warmslip import extremes as ladders
     from warmslip import study as studies
 
-    checked = scenes.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])])
+    checked = scenes.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])]).full()
     studies.write(_writable(out), ladders.table(checked), studies.stamp(checked))
 
 

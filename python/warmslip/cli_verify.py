@@ -27,7 +27,7 @@ def check(
     from warmslip import study as studies
     from warmslip.verify import audit, audit_report
 
-    checked = scenes.load(scene, set_)
+    checked = scenes.load(scene, set_).full()
     found = audit.audit(checked)
     if MPI.COMM_WORLD.rank == 0:
         Console().print(audit_report.table(found, checked.title))

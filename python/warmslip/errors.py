@@ -22,25 +22,30 @@ class Comparison:
         self._coarse, self._fine = coarse, fine
         # the same mesh needs no interpolation
         self._prolong = None if coarse.mesh is fine.mesh else _core.prolongation(coarse.mesh, fine.mesh)
-        self._errors = [fine.layout.vector(block) for block in (fine.dim, fine.dim, 1)]
+        moves, conducts = fine.problem.moves, fine.problem.conducts
+        self._fields = [*(["u", "w"] if moves else []), *(["theta"] if conducts else [])]
+        self._errors = {name: fine.layout.vector(1 if name == "theta" else fine.dim) for name in self._fields}
 
     def difference(self, coarse: Any, fine: Any) -> dict[str, float]:
-        """Errors of the state of stepper `coarse` against that of stepper `fine` (collective)."""
-        states = coarse.u, coarse.w, coarse.theta
+        """Errors of the state of stepper `coarse` against that of stepper `fine`; 0 of a field there is not (collective)."""
+        states = [getattr(coarse, name) for name in self._fields]
+        errors = list(self._errors.values())
         if self._prolong is None:
-            for error, state in zip(self._errors, states, strict=True):
+            for error, state in zip(errors, states, strict=True):
                 state.copy(error)
         else:
             nodes = len(self._coarse.mesh.nodes)
             parts = [self._coarse.layout.gather(state).reshape(nodes, -1) for state in states]
             values = np.split(self._prolong @ np.hstack(parts), np.cumsum([p.shape[1] for p in parts])[:-1], axis=1)
-            for error, part in zip(self._errors, values, strict=True):
+            for error, part in zip(errors, values, strict=True):
                 self._fine.layout.distribute(np.ascontiguousarray(part).ravel(), error)
-        for error, state in zip(self._errors, (fine.u, fine.w, fine.theta), strict=True):
-            error.axpy(-1.0, state)
-        u, w, theta = self._errors
-        norms = self._fine.norms
-        return {"u_V": norms.v(u), "w_L2": norms.l2(w), "theta_L2": norms.l2(theta)}
+        for name, error in self._errors.items():
+            error.axpy(-1.0, getattr(fine, name))
+        norms = {"u": self._fine.norms.v, "w": self._fine.norms.l2, "theta": self._fine.norms.l2}
+        return {
+            term: norms[name](self._errors[name]) if name in self._errors else 0.0
+            for name, term in zip(("u", "w", "theta"), TERMS, strict=True)
+        }
 
 
 class ExactErrors:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from warmslip.runner import FLOORS, IDENTITIES, Run
-from warmslip.scene import Scene, SceneError
+from warmslip.scene import FullScene, SceneError
 
 Overrides = dict[str, Any]
 
@@ -56,7 +56,7 @@ STAGES = ("none", "newton", "line_search", "fixed_point", "enumeration")
 AGREEMENT = 1e-6
 
 
-def cell(scene: Scene, ladder: str, value: Any) -> dict[str, Any]:
+def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     """One run at one value: its outcome, the worst of each identity, and a verdict.
 
     `right`: the run says so and a second run, whose linear algebra is PETSc's instead of CHOLMOD's, has the same norms to
@@ -106,7 +106,7 @@ def disagreement(one: Run, other: Run) -> float:
     return max(abs(a - b) / max(abs(a), abs(b)) if a or b else 0.0 for a, b in pairs)
 
 
-def table(scene: Scene, progress: Callable[[str, Any], None] | None = None) -> list[dict[str, Any]]:
+def table(scene: FullScene, progress: Callable[[str, Any], None] | None = None) -> list[dict[str, Any]]:
     """Every ladder on `scene`."""
     out = []
     for ladder, (_, values) in LADDERS.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warmslip import _core
+from warmslip.expressions import Expression, constant
 from warmslip.scene import Scene
 
 Array = NDArray[np.float64]
@@ -17,33 +19,79 @@ Data = Any
 
 
 @dataclass(frozen=True)
+class Formula:
+    """Formulas of a scene, one a component, as a function (x, t) -> (points, components); `of_time` says whether t is in them."""
+
+    components: tuple[Expression, ...]
+
+    @property
+    def of_time(self) -> bool:
+        return any(one.of_time for one in self.components)
+
+    def __call__(self, x: Array, t: float) -> Array:
+        return np.column_stack([one(x, t) for one in self.components])
+
+
+def data(value: Any) -> Data:
+    """A scene's value, a number or a formula or a list of them, as a constant or a `Formula`."""
+    values = value if isinstance(value, list) else [value]
+    if constant(*values):
+        return np.array(values, dtype=float) if isinstance(value, list) else float(value)
+    return Formula(tuple(Expression(str(v)) for v in values))
+
+
+def of_time(data: Data) -> bool:
+    """Whether the datum may change with time; a function that does not say otherwise may."""
+    return bool(getattr(data, "of_time", callable(data)))
+
+
+@dataclass(frozen=True)
 class Loads:
     """Right-hand sides in the letters of the paper. Each value is a constant or a function (x, t) -> array.
 
-    body f0, source q0; traction fN and heat_flux h by boundary part (a flux into the body); contact_traction gC, an extra
-    traction on Gamma_C for manufactured solutions; contact_flux likewise; gap g and foundation_temperature theta_F on
-    Gamma_C. `points` is the number of quadrature points per direction of the functions.
+    body f0, source q0; traction fN and heat_flux h by boundary part (a flux into the body); displacement u_D and temperature
+    theta_D by supported part; contact_traction gC, an extra traction on all of Gamma_C for manufactured solutions;
+    contact_flux likewise; gap g and foundation_temperature theta_F on Gamma_C, one for all parts of it or a list with one for
+    each. `points` is the number of quadrature points per direction of the functions. A function that does not depend on time
+    may say so by an attribute `of_time = False`.
     """
 
     body: Data = 0.0
     source: Data = 0.0
     traction: dict[str, Data] = field(default_factory=dict)
     heat_flux: dict[str, Data] = field(default_factory=dict)
+    displacement: dict[str, Data] = field(default_factory=dict)
+    temperature: dict[str, Data] = field(default_factory=dict)
     contact_traction: Data = 0.0
     contact_flux: Data = 0.0
-    gap: Data = 0.0
-    foundation_temperature: Data = 0.0
+    gap: Data | list[Data] = 0.0
+    foundation_temperature: Data | list[Data] = 0.0
     points: int = 3
 
     @classmethod
     def of(cls, scene: Scene) -> Loads:
+        contacts = scene.contacts
+
+        def each(values: list[Data]) -> Data | list[Data]:
+            return values[0] if len(values) == 1 else values or 0.0
+
         return cls(
-            body=np.array(scene.loads.body),
-            source=scene.heat.source,
-            traction={part: np.array(value) for part, value in scene.loads.traction.items()},
-            gap=scene.contact.gap,
-            foundation_temperature=scene.contact.heat_exchange.foundation_temperature,
+            body=data(scene.loads.body) if scene.loads.body is not None else 0.0,
+            source=data(scene.heat.source) if scene.heat is not None else 0.0,
+            traction={part: data(value) for part, value in scene.loads.traction.items()},
+            heat_flux={part: data(value) for part, value in scene.loads.heat_flux.items()},
+            displacement={part: data(value) for part, value in scene.supports.moved.items()},
+            temperature={part: data(value) for part, value in scene.supports.warmed.items()},
+            gap=each([data(c.gap) for c in contacts]),
+            foundation_temperature=each(
+                [data(c.heat_exchange.foundation_temperature) if c.heat_exchange else 0.0 for c in contacts]
+            ),
         )
+
+    def on_contact(self, name: str, number: int) -> Data:
+        """`gap` or `foundation_temperature` of one contact part."""
+        value = getattr(self, name)
+        return value[number] if isinstance(value, list) else value
 
 
 def evaluate(data: Data, x: Array, t: float, components: int) -> Array:
@@ -60,13 +108,31 @@ def evaluate(data: Data, x: Array, t: float, components: int) -> Array:
     return np.ascontiguousarray(value)
 
 
-class LoadVectors:
-    """Load vectors (f, v) and (q, eta) and the gap at any time; what does not depend on time is assembled once."""
+@dataclass(frozen=True)
+class StepData:
+    """What one step is given: load vectors (f, v) and (q, eta), the gap (points), velocity and temperature of the supports
+    where those are not zero, theta_F (points) where the conductance depends on the pressure; None or empty what is absent."""
 
-    def __init__(
-        self, layout: Any, surface: Any, loads: Loads, contact_part: str, conductance: float, dim: int, comm: Any
-    ) -> None:
-        self._surface, self._loads, self._comm = surface, loads, comm
+    force: Any
+    heat: Any
+    gap: Array
+    support_velocity: Any
+    support_temperature: Any
+    foundation: Array
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.force, self.heat, self.gap, self.support_velocity, self.support_temperature, self.foundation))
+
+
+class LoadVectors:
+    """The data of every step; what does not depend on time is assembled once."""
+
+    def __init__(self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any) -> None:
+        dim = scene.mesh.dim
+        self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
+        self._mesh, self._layout, self._step = mesh, layout, scene.step
+        self._held = list(scene.supports.displacement), list(scene.supports.temperature)
+        moves, conducts = scene.moves, scene.heat is not None
         quadrature = _core.LoadQuadrature2 if dim == 2 else _core.LoadQuadrature3
         rules: dict[tuple[str | None, int], Any] = {}
 
@@ -77,28 +143,43 @@ class LoadVectors:
                 rules[key] = quadrature(layout, *key)
             return rules[key]
 
-        foundation = loads.foundation_temperature
-        heated: Data = (
-            (lambda x, t: conductance * foundation(x, t)) if callable(foundation) else conductance * foundation
-        )
+        contacts = [(c.part, c.heat_exchange.conductance if c.heat_exchange else 0.0) for c in scene.contacts]
+        heated = [_times(k_c, loads.on_contact("foundation_temperature", i)) for i, (_, k_c) in enumerate(contacts)]
         terms = [
             (True, None, loads.body),
             *((True, part, data) for part, data in loads.traction.items()),
-            (True, contact_part, loads.contact_traction),
+            *((True, part, loads.contact_traction) for part, _ in contacts),
             (False, None, loads.source),
             *((False, part, data) for part, data in loads.heat_flux.items()),
-            (False, contact_part, heated),
-            (False, contact_part, loads.contact_flux),
+            *((False, part, data) for (part, _), data in zip(contacts, heated, strict=True)),
+            *((False, part, loads.contact_flux) for part, _ in contacts),
         ]
-        self._dim = dim
-        self._constant = layout.vector(dim), layout.vector(1)
-        self._present = layout.vector(dim), layout.vector(1)
+        self._constant: tuple[Any, Any] = (
+            layout.vector(dim) if moves else None,
+            layout.vector(1) if conducts else None,
+        )
         self._moving: list[tuple[bool, Any, Data]] = []
         for mechanical, part, data in terms:
-            if callable(data):
+            if not (moves if mechanical else conducts):
+                continue
+            if of_time(data):
                 self._moving.append((mechanical, rule(part, data), data))
-            elif np.any(data):
+            elif callable(data) or np.any(data):
                 self._add(self._constant, mechanical, rule(part, data), data, 0.0)
+        moving = [any(mechanical == motion for mechanical, _, _ in self._moving) for motion in (True, False)]
+        self._present = layout.vector(dim) if moving[0] else None, layout.vector(1) if moving[1] else None
+        self._supports = (
+            layout.vector(dim)
+            if moves and any(callable(v) or np.any(v) for v in loads.displacement.values())
+            else None,
+            layout.vector(1)
+            if conducts and any(callable(v) or np.any(v) for v in loads.temperature.values())
+            else None,
+        )
+        touching = [i for i, c in enumerate(scene.contacts) if c.stiffness is not None]
+        self._points = {i: np.flatnonzero(np.asarray(surface.contacts, int) == i) for i in touching}
+        self._reactive = conducts and any(c.heats for c in scene.contacts)
+        self._kept: dict[str, Array] = {}
 
     def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float) -> None:
         vector = rule.load(self._together(data, rule.positions, t, self._dim if mechanical else 1))
@@ -119,13 +200,65 @@ class LoadVectors:
             raise ValueError(errors[0])
         return values
 
-    def at(self, t: float) -> tuple[Any, Any, Array]:
-        """(force, heat, gap) at time t, valid until the next call; the vectors must not be changed."""
-        pair = self._constant
-        if self._moving:
-            pair = self._present
-            for constant, present in zip(self._constant, self._present, strict=True):
-                constant.copy(present)
-            for mechanical, rule, data in self._moving:
-                self._add(pair, mechanical, rule, data, t)
-        return *pair, self._together(self._loads.gap, self._surface.positions, t, 1)[:, 0]
+    def on_points(self, name: str, t: float) -> Array:
+        """`gap` or `foundation_temperature` at the contact points at time t, (points,)."""
+        if name in self._kept:
+            return self._kept[name]
+        x = np.asarray(self._surface.positions)
+        out, moving = np.zeros(len(x)), False
+        for i, points in self._points.items():
+            value = self._loads.on_contact(name, i)
+            out[points] = self._together(value, x[points], t, 1)[:, 0]
+            moving = moving or of_time(value)
+        if not moving:
+            self._kept[name] = out
+        return out
+
+    def held(self, which: int, t: float) -> dict[str, tuple[Any, Array]]:
+        """Given displacement (which = 0) or temperature (1) at time t: held nodes and their values by part."""
+        given = (self._loads.displacement, self._loads.temperature)[which]
+        x = np.asarray(self._mesh.nodes)
+        out: dict[str, tuple[Any, Array]] = {}
+        for part in self._held[which]:
+            nodes = np.unique(self._mesh.parts[part])
+            out[part] = nodes, self._together(given.get(part, 0.0), x[nodes], t, (self._dim, 1)[which])
+        return out
+
+    def _support(self, which: int, t: float) -> Any:
+        vector = self._supports[which]
+        if vector is None:
+            return None
+        values = np.zeros((len(self._mesh.nodes), (self._dim, 1)[which]))
+        before = self.held(0, t - self._step) if which == 0 else None
+        for part, (nodes, now) in self.held(which, t).items():
+            values[nodes] = now if before is None else (now - before[part][1]) / self._step
+        self._layout.distribute(values.ravel(), vector)
+        return vector
+
+    def at(self, t: float) -> StepData:
+        """The data of the step that ends at time t, valid until the next call; the vectors must not be changed."""
+        pair: list[Any] = list(self._constant)
+        for i, present in enumerate(self._present):
+            if present is not None:
+                self._constant[i].copy(present)
+                pair[i] = present
+        for mechanical, rule, data in self._moving:
+            self._add((pair[0], pair[1]), mechanical, rule, data, t)
+        foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
+        return StepData(
+            pair[0], pair[1], self.on_points("gap", t), self._support(0, t), self._support(1, t), foundation
+        )
+
+
+def _times(factor: float, data: Data) -> Data:
+    """The datum times a constant."""
+    if not callable(data):
+        return factor * data
+    if factor == 0:
+        return 0.0
+
+    def product(x: Array, t: float) -> Array:
+        return np.asarray(factor * np.asarray(data(x, t)))
+
+    product.of_time = of_time(data)  # type: ignore[attr-defined]
+    return product

@@ -20,15 +20,14 @@ from warmslip.errors import TERMS, ExactErrors, Largest
 from warmslip.loads import Array
 from warmslip.problem import discretise
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Description, Manufactured, T, X, Y
-from warmslip.tables import PARTS
 
 ROUNDING = 1e-10  # of scale: no contradiction, only floating point
 TIMES = 11  # at which a description is checked
 
 
-def derive(scene: Scene, fields: Description, points: int = 3) -> Manufactured:
+def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactured:
     """The loads under which `fields` solve the scene's problem, for fields that are what they claim to be.
 
     They are checked on a grid of places and times. Raises ValueError, one sentence with the place, when they do not vanish on
@@ -51,16 +50,16 @@ def derive(scene: Scene, fields: Description, points: int = 3) -> Manufactured:
     return solution
 
 
-def _places(scene: Scene, part: str) -> Array:
+def _places(scene: FullScene, part: str) -> Array:
     """A grid of positions on a part of the box, (points, d)."""
-    place = PARTS[scene.mesh.shape].index(part)
+    place = scene.mesh.parts.index(part)
     along = [np.linspace(0, side, 101 if scene.mesh.dim == 2 else 21) for side in scene.mesh.sides]
     along[place // 2] = along[place // 2][[-(place % 2)]]
     return np.stack([c.ravel() for c in np.meshgrid(*along, indexing="ij")], axis=1)
 
 
 def _contradictions(
-    scene: Scene, fields: Description, solution: Manufactured, x: Array, times: Array
+    scene: FullScene, fields: Description, solution: Manufactured, x: Array, times: Array
 ) -> Iterator[tuple[str, Array, float]]:
     """What is wrong on the contact part, and where and when first."""
     touch, claim = solution.touch, fields.claim
@@ -119,7 +118,7 @@ def sliding() -> Description:
     return Description(u, theta, claim="slip")
 
 
-def slipping(scene: Scene) -> Manufactured:
+def slipping(scene: FullScene) -> Manufactured:
     """Full slip to the right with a varying pressure, for a 2D scene clamped at the top and cooled at top, left and right.
 
     Raises ValueError when the scene's supports are not those, or when the fields would leave contact or reverse the slip.
@@ -136,7 +135,7 @@ def slipping(scene: Scene) -> Manufactured:
 
 
 def errors(
-    scene: Scene, solution: Manufactured, *, mesh: Any = None, watch: Callable[[Run], None] | None = None
+    scene: FullScene, solution: Manufactured, *, mesh: Any = None, watch: Callable[[Run], None] | None = None
 ) -> tuple[dict[str, float], Run]:
     """Largest errors over all times of a run with the manufactured data, and the run.
 
@@ -168,7 +167,7 @@ def grid(path: str, levels: list[int]) -> list[tuple[int, int]]:
     return [(n, coarse[0] * (n // coarse[0]) ** 2) for n in coarse]
 
 
-def table(scene: Scene, couplings: list[str], levels: list[int], path: str) -> list[dict[str, Any]]:
+def table(scene: FullScene, couplings: list[str], levels: list[int], path: str) -> list[dict[str, Any]]:
     """Errors and orders along one path for each coupling; `levels` are 1/h, each twice the one before.
 
     Raises ValueError for fewer than three levels, or others than 4, 8, 16 .. times a number.

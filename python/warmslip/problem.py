@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import _core
-from warmslip.loads import Array, Loads, LoadVectors, evaluate
-from warmslip.scene import Scene
-from warmslip.tables import IsotropicTable
+from warmslip import _core, mesh_files
+from warmslip.expressions import Expression
+from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
+from warmslip.scene import FullScene, Scene
+from warmslip.tables import ContactTable, IsotropicTable, RegionTable
+
+COUPLINGS = ("expansion", "heating")
 
 
 def _d(name: str, dim: int) -> Any:
@@ -18,17 +21,102 @@ def _d(name: str, dim: int) -> Any:
 
 
 def mandel(table: IsotropicTable, dim: int) -> Array:
-    """The isotropic tensor lambda tr(e) I + 2 mu e in Mandel form, (3, 3) or (6, 6)."""
+    """The tensor of a table in Mandel form, (3, 3) or (6, 6): lambda tr(e) I + 2 mu e, or the full one."""
+    if table.tensor is not None:
+        shear = np.concatenate([np.ones(dim), np.full(dim * (dim - 1) // 2, np.sqrt(2))])
+        return np.asarray(np.array(table.tensor) * np.outer(shear, shear))
     lam, mu = table.pair(dim)
     tensor = 2 * mu * np.eye(dim * (dim + 1) // 2)
     tensor[:dim, :dim] += lam
     return tensor
 
 
+def _matrix(value: Any, dim: int) -> Array:
+    return np.array(value, dtype=float) if isinstance(value, list) else value * np.eye(dim)
+
+
 def make_mesh(scene: Scene) -> Any:
     """The scene's mesh as a `_core.Mesh2` or `_core.Mesh3`."""
     table = scene.mesh
-    return _d("Mesh", table.dim).box(table.counts, table.sides, getattr(_core.Diagonal, table.diagonal))
+    kind = _d("Mesh", table.dim)
+    if table.file is not None:
+        read = mesh_files.read(table.file)
+        return kind.from_lists(read.nodes, read.cells, read.parts)
+    mesh = kind.box(table.counts, table.sides, getattr(_core.Diagonal, table.diagonal))
+    if table.grading is None:
+        return mesh
+    nodes = np.array(mesh.nodes)
+    for axis, (ratio, length) in enumerate(zip(table.grading, table.sides, strict=True)):
+        if ratio != 1:  # a geometric row of bricks; halving them keeps meshes nested
+            nodes[:, axis] = length * np.expm1(np.log(ratio) * nodes[:, axis] / length) / (ratio - 1)
+    return kind.from_lists(nodes, mesh.cells, {name: np.array(facets) for name, facets in mesh.parts.items()})
+
+
+def _materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
+    """One `_core.Material` for the body and each region, and the number of that of every cell (empty without regions)."""
+    d = scene.mesh.dim
+
+    def material(region: RegionTable | None) -> Any:
+        def table(name: str) -> Any:
+            return getattr(region, name, None) or getattr(scene, name)
+
+        inertia, heat = table("inertia"), table("heat")
+        coupling = {name: getattr(heat, name, None) or getattr(scene.heat, name, None) for name in COUPLINGS}
+        return _d("Material", d)(
+            density=inertia.density if inertia is not None else 0.0,
+            **{
+                name: mandel(table(name), d) if table(name) is not None else None
+                for name in ("elasticity", "viscosity")
+            },
+            conductivity=_matrix(heat.conductivity, d) if heat is not None else None,
+            **{name: _matrix(value.tensor, d) if value is not None else None for name, value in coupling.items()},
+            capacity=heat.capacity if heat is not None else 1.0,
+        )
+
+    materials = [material(None), *(material(region) for region in scene.regions.values())]
+    if not scene.regions:
+        return materials, []
+    numbers = np.zeros(len(mesh.cells), dtype=int)
+    centroids = np.asarray(mesh.nodes)[np.asarray(mesh.cells)].mean(axis=1)
+    for i, (name, region) in enumerate(scene.regions.items(), start=1):
+        if region.where is None:
+            cells = mesh_files.read(str(scene.mesh.file)).regions[name]
+        else:
+            cells = np.flatnonzero(Expression(region.where)(centroids, 0.0))
+        if len(cells) == 0:
+            raise ValueError(f"regions.{name}: no cell lies in it; correct its `where`")
+        numbers[cells] = i
+    return materials, numbers.tolist()
+
+
+def contact_part(contact: ContactTable) -> Any:
+    """A contact table as a `_core.ContactPart`."""
+    law, friction, exchange = None, contact.friction, contact.heat_exchange
+    if contact.stiffness is not None:
+        compliance = _core.NormalCompliance(
+            stiffness=contact.stiffness,
+            exponent=contact.exponent,
+            most=np.inf if contact.pressure_limit is None else contact.pressure_limit,
+            custom=None,
+        )
+        bound = _core.Friction(
+            coefficient=friction.coefficient if friction else 0.0,
+            cohesion=friction.cohesion if friction else 0.0,
+            limit=np.inf if friction is None or friction.limit is None else friction.limit,
+            kinetic=(friction and friction.kinetic) or 0.0,
+            speed=(friction and friction.speed) or 0.0,
+            regularisation=(friction and friction.regularisation) or 0.0,
+            custom=None,
+        )
+        law = _core.ContactLaw(compliance=compliance, friction=bound)
+    return _core.ContactPart(
+        part=contact.part,
+        law=law,
+        quadrature=contact.points,
+        conductance=exchange.conductance if exchange else 0.0,
+        per_pressure=exchange.per_pressure if exchange else 0.0,
+        friction_share=contact.friction_heating.share if contact.friction_heating else 0.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -50,9 +138,14 @@ class Discretisation:
         return self.scene.mesh.dim
 
     @property
+    def full(self) -> FullScene:
+        """The scene with every block there, see `Scene.full`."""
+        return self.scene if isinstance(self.scene, FullScene) else self.scene.full()
+
+    @property
     def unknowns(self) -> int:
         """Degrees of freedom of u and theta together, supports included."""
-        return (self.dim + 1) * len(self.mesh.nodes)
+        return (self.dim * int(self.problem.moves) + int(self.problem.conducts)) * len(self.mesh.nodes)
 
     def stepper(self, *, backend: str = "automatic", tolerance: float | None = None) -> Any:
         """A `_core.Stepper` at the initial data; `backend` is automatic, cholmod or petsc."""
@@ -70,41 +163,55 @@ class Discretisation:
             backend=getattr(_core.Backend, backend),
             contact=options,
         )
-        zero = np.zeros(self.dim)
-        initial = scene.initial
+        x, initial = np.asarray(self.mesh.nodes), scene.initial
+
+        def start(value: Any) -> Array:
+            return evaluate(data(value) if value is not None else 0.0, x, 0.0, self.dim)
+
         return self.restart(
             stepper,
-            np.tile(zero if initial.displacement is None else initial.displacement, (len(self.mesh.nodes), 1)),
-            np.tile(zero if initial.velocity is None else initial.velocity, (len(self.mesh.nodes), 1)),
-            np.full(len(self.mesh.nodes), initial.temperature),
+            start(initial.displacement),
+            start(initial.velocity),
+            evaluate(data(initial.temperature), x, 0.0, 1)[:, 0],
             0.0,
         )
 
     def restart(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
-        """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made zero on the supports."""
+        """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made what is given on the supports.
+
+        Fields that the problem does not have are left aside.
+        """
         u, w, theta = u.copy(), w.copy(), theta.copy()
-        for part in self.scene.supports.displacement:
-            u[np.unique(self.mesh.parts[part])] = 0
-            w[np.unique(self.mesh.parts[part])] = 0
-        for part in self.scene.supports.temperature:
-            theta[np.unique(self.mesh.parts[part])] = 0
-        vectors = [self.layout.vector(self.dim), self.layout.vector(self.dim), self.layout.vector(1)]
-        for values, vector in zip((u, w, theta), vectors, strict=True):
-            self.layout.distribute(values.ravel(), vector)
-        gap = evaluate(self.loads.gap, self.surface.positions, time, 1)[:, 0]
-        stepper.start(*vectors, gap, time)
+        for nodes, values in self.load_vectors.held(0, time).values():
+            u[nodes], w[nodes] = values, 0
+        for nodes, values in self.load_vectors.held(1, time).values():
+            theta[nodes] = values[:, 0]
+        vectors: list[Any] = [None, None, None]
+        for i, (there, values) in enumerate(
+            ((self.problem.moves, u), (self.problem.moves, w), (self.problem.conducts, theta))
+        ):
+            if there:
+                vectors[i] = self.layout.vector(1 if values.ndim == 1 else self.dim)
+                self.layout.distribute(values.ravel(), vectors[i])
+        stepper.start(*vectors, self.load_vectors.on_points("gap", time), time)
         for vector in vectors:
-            vector.destroy()  # petsc4py would only mark it for a later collection
+            if vector is not None:
+                vector.destroy()  # petsc4py would only mark it for a later collection
         return stepper
 
-    def field(self, vec: Any) -> Array:
-        """A vector in mesh numbering on every rank: (nodes, d), or (nodes,) for theta. Collective."""
+    def field(self, vec: Any) -> Any:
+        """A vector in mesh numbering on every rank: (nodes, d), or (nodes,) for theta; None for no vector. Collective."""
+        if vec is None:
+            return None
         values = np.asarray(self.layout.gather(vec))
         return values if len(values) == len(self.mesh.nodes) else values.reshape(len(self.mesh.nodes), -1)
 
-    def stress(self, u: Array, w: Array, theta: Array) -> Array:
-        """Cauchy stress (2.1) at the centroids, (cells, d, d)."""
-        flat = _core.stress(self.mesh, self.problem.material, u, w, theta)
+    def stress(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Cauchy stress (2.1) at the centroids, (cells, d, d); None for a field the problem does not have."""
+        none = np.empty((0, self.dim))
+        flat = _core.stress(
+            self.problem, none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
+        )
         return np.asarray(flat).reshape(-1, self.dim, self.dim)
 
     def mises(self, stepper: Any) -> Array:
@@ -121,35 +228,27 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD if comm is None else comm
-    d, contact = scene.mesh.dim, scene.contact
+    d = scene.mesh.dim
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
-    material = _d("Material", d)(
-        density=scene.inertia.density,
-        elasticity=mandel(scene.elasticity, d),
-        viscosity=mandel(scene.viscosity, d),
-        conductivity=np.array(scene.heat.conductivity),
-        expansion=np.array(scene.heat.expansion.tensor),
-        heating=np.array(scene.heat.heating.tensor),
-    )
+    materials, regions = _materials(scene, mesh)
     problem = _d("Problem", d)(
         mesh=mesh,
-        material=material,
-        clamped=scene.supports.displacement,
-        cooled=scene.supports.temperature,
-        contact_part=contact.part,
-        stiffness=contact.stiffness,
-        friction=contact.friction.coefficient,
-        quadrature=contact.points,
-        conductance=contact.heat_exchange.conductance,
+        materials=materials,
+        regions=regions,
+        clamped=list(scene.supports.displacement),
+        cooled=list(scene.supports.temperature),
+        contacts=[contact_part(contact) for contact in scene.contacts],
     )
     layout = _d("Layout", d)(comm, mesh)
     surface = _d("ContactSurface", d)(layout, problem)
-    if len(surface.weights) == 0:
-        raise ValueError(
-            f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
-        )
-    vectors = LoadVectors(layout, surface, loads, contact.part, contact.heat_exchange.conductance, d, comm)
+    touched = set(surface.contacts)
+    for i, contact in enumerate(scene.contacts):
+        if contact.stiffness is not None and i not in touched:
+            raise ValueError(
+                f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
+            )
+    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm)
     return Discretisation(
         scene,
         loads,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from warmslip.errors import SUMS, TERMS
-from warmslip.scene import Scene, build
+from warmslip.scene import FullScene, build_full
 
 Row = dict[str, Any]
 
@@ -101,7 +101,7 @@ def entitled(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tu
     return single[term] if term in single else min(single[one] for one in SUMS[term])
 
 
-def papers(scene: Scene) -> bool:
+def papers(scene: FullScene) -> bool:
     """Whether `entitled` speaks of the scene: the paper's square with its supports, loads at rest, whatever the constants."""
     supports, initial = scene.supports, scene.initial
     return (
@@ -121,7 +121,7 @@ def table(path: Path, scene: Row) -> list[Row]:
     entitled one here (`warmslip check` states what its corners and its start allow). Raises ValueError for fewer than three
     levels with h = k.
     """
-    rows, built = read(path), build(scene)
+    rows, built = read(path), build_full(scene)
     reference = rows[-1]["h"]
     diagonal = sorted((r for r in rows[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
     if len(diagonal) < 3:

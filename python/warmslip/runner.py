@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core, mesh_io, provenance
-from warmslip.loads import Array, Loads
+from warmslip.loads import Loads
 from warmslip.problem import Discretisation, discretise
 from warmslip.scene import Scene
 from warmslip.trajectory import TrajectoryWriter
@@ -24,12 +24,15 @@ FLOORS = ("law_floor", "energy_floor", "force_floor")
 
 @dataclass(frozen=True)
 class Result:
-    """The end of a run: `summary` as in summary.json and the final fields in mesh numbering, (nodes, d) and (nodes,)."""
+    """The end of a run: `summary` as in summary.json and the final fields in mesh numbering, (nodes, d) and (nodes,).
+
+    A field that the scene does not have is None.
+    """
 
     summary: dict[str, Any]
-    u: Array
-    w: Array
-    theta: Array
+    u: Any
+    w: Any
+    theta: Any
     trajectory: Path | None
 
     @property
@@ -118,12 +121,8 @@ class Run:
             "failure": self.failure,
             "time": s.time,
             "steps": cost.steps,
-            "norms": {
-                "u_V": norms.v(s.u),
-                "u_L2": norms.l2(s.u),
-                "w_L2": norms.l2(s.w),
-                "theta_L2": norms.l2(s.theta),
-            },
+            "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
+            | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
             "contact": contact | counts | {"traction": traction},
             "identities": self.worst | self.floors,
             "newton": {

@@ -8,128 +8,63 @@ import json
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self, TypeVar, get_args
 
-from pydantic import ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
+from warmslip import mesh_files
 from warmslip import tables as t
-
-SHORTEST = 1e-150  # step, time: its inverse is squared on the way
+from warmslip.consistency import problems
 
 
 class SceneError(ValueError):
     """A scene that cannot be run; the message is one sentence a problem, each with its key and its cure."""
 
 
+OneOrMore = Annotated[
+    Annotated[t.ContactTable, Tag("one")] | Annotated[list[t.ContactTable], Tag("several")],
+    Discriminator(lambda value: "several" if isinstance(value, list) else "one"),
+]
+KINDS = ("int", "list[", "dict[", "constrained", "one", "several", "float", "function-")  # what pydantic adds to places
+
+
 class Scene(t.Table):
-    """A whole scene. Tables are blocks of the problem; keys are those of the TOML file."""
+    """A whole scene. Tables are blocks of the problem, and what is absent costs nothing; keys are those of the TOML file."""
 
     title: str = ""
     mesh: t.MeshTable
     time: t.TimeTable
-    inertia: t.InertiaTable
-    elasticity: t.IsotropicTable
-    viscosity: t.IsotropicTable
-    heat: t.HeatTable
-    loads: t.LoadsTable
-    supports: t.SupportsTable
-    contact: t.ContactTable
+    inertia: t.InertiaTable | None = None
+    elasticity: t.IsotropicTable | None = None
+    viscosity: t.IsotropicTable | None = None
+    heat: t.HeatTable | None = None
+    loads: t.LoadsTable = t.LoadsTable()
+    supports: t.SupportsTable = t.SupportsTable()
+    contact: OneOrMore | None = None
+    regions: dict[str, t.RegionTable] = Field(default_factory=dict)
     initial: t.InitialTable = t.InitialTable()
     output: t.OutputTable = t.OutputTable()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        problems = [*self._part_problems(), *self._size_problems(), *self._tensor_problems()]
-        if self.inertia.density == 0 and not self.supports.displacement:
-            problems.append(
-                "supports.displacement: the momentum operator is singular without support and without inertia; "
-                "clamp a part or give inertia.density > 0"
-            )
-        if self.step < SHORTEST:
-            problems.append(f"time: a step of {self.step:g} is too short to divide by; take fewer steps or a later end")
-        if problems:
-            raise ValueError("\n".join(problems))
+        if found := problems(self):
+            raise ValueError("\n".join(found))
         return self
 
-    def _part_problems(self) -> list[str]:
-        known = t.PARTS[self.mesh.shape]
-        held = self.supports.displacement
-        named = {
-            "supports.displacement": self.supports.displacement,
-            "supports.temperature": self.supports.temperature,
-            "loads.traction": list(self.loads.traction),
-            "contact.part": [self.contact.part],
-        }
-        found = [
-            f"{key}: unknown boundary part '{part}'; a {self.mesh.shape} has {', '.join(known)}"
-            for key, parts in named.items()
-            for part in parts
-            if part not in known
-        ]
-        found += [
-            f"loads.traction.{part}: the part is clamped and a traction on it does nothing; remove one of the two"
-            for part in self.loads.traction
-            if part in held
-        ]
-        for key in ("displacement", "temperature"):
-            parts = getattr(self.supports, key)
-            if len(set(parts)) < len(parts):
-                found.append(f"supports.{key}: a part is named twice; name each once")
-            if self.contact.part in parts:
-                found.append(f"supports.{key}: '{self.contact.part}' is the contact part and cannot be held; remove it")
-        return found
+    @property
+    def moves(self) -> bool:
+        """Whether there is a velocity to solve for."""
+        return (
+            self.elasticity is not None
+            or self.viscosity is not None
+            or (self.inertia is not None and self.inertia.density > 0)
+        )
 
-    def _size_problems(self) -> list[str]:
-        d = self.mesh.dim
-        vectors = {
-            "loads.body": self.loads.body,
-            "initial.displacement": self.initial.displacement,
-            "initial.velocity": self.initial.velocity,
-            **{f"loads.traction.{part}": value for part, value in self.loads.traction.items()},
-        }
-        found = [
-            f"{key} has {len(value)} components; a {self.mesh.shape} needs {d}"
-            for key, value in vectors.items()
-            if value is not None and len(value) != d
-        ]
-        for key, tensor in self._matrices().items():
-            if len(tensor) != d or any(len(row) != d for row in tensor):
-                found.append(f"{key} must be a {d} x {d} matrix")
-            elif any(tensor[i][j] != tensor[j][i] for i in range(d) for j in range(i)):
-                found.append(f"{key} must be symmetric; set its entries [i][j] and [j][i] equal")
-        return found
-
-    def _tensor_problems(self) -> list[str]:
-        d, found = self.mesh.dim, []
-        stiff = False
-        for key in ("elasticity", "viscosity"):
-            table: t.IsotropicTable = getattr(self, key)
-            if d == 3 and table.assumption in ("plane_stress", "plane_strain"):
-                found.append(f"{key}.assumption: {table.assumption} has no meaning in a cube; use solid")
-                continue
-            lam, mu = table.pair(d)
-            if mu < 0 or d * lam + 2 * mu < 0:
-                found.append(f"{key}: the tensor must not be negative; it needs mu >= 0 and {d} lambda + 2 mu >= 0")
-            stiff = stiff or mu > 0
-        if not found and not stiff and self.inertia.density == 0:
-            found.append(
-                "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
-            )
-        k = self.heat.conductivity
-        if (
-            len(k) == d
-            and all(len(row) == d for row in k)
-            and _smallest_eigenvalue(k) < -1e-12 * max(abs(x) for r in k for x in r)
-        ):
-            found.append("heat.conductivity must not have a negative eigenvalue; heat would flow from cold to hot")
-        return found
-
-    def _matrices(self) -> dict[str, list[list[float]]]:
-        return {
-            "heat.conductivity": self.heat.conductivity,
-            "heat.expansion.tensor": self.heat.expansion.tensor,
-            "heat.heating.tensor": self.heat.heating.tensor,
-        }
+    @property
+    def contacts(self) -> list[t.ContactTable]:
+        if self.contact is None:
+            return []
+        return self.contact if isinstance(self.contact, list) else [self.contact]
 
     @property
     def step(self) -> float:
@@ -137,25 +72,76 @@ class Scene(t.Table):
         return self.time.end / self.time.steps
 
     def resolved(self) -> dict[str, Any]:
-        """The scene as plain data, defaults filled in."""
-        return self.model_dump(mode="json")
+        """The scene as plain data, defaults filled in and absent tables left out."""
+        return self.model_dump(mode="json", exclude_none=True)
 
     def digest(self) -> str:
-        """A hash of the resolved scene."""
-        return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()[:16]
+        """A hash of the resolved scene and of its mesh file."""
+        data = json.dumps(self.resolved(), sort_keys=True)
+        if self.mesh.file is not None:
+            data += mesh_files.read(self.mesh.file).digest
+        return hashlib.sha256(data.encode()).hexdigest()[:16]
 
-    def override(self, **values: Any) -> Scene:
-        """The scene with some keys replaced, dots written as in `override(**{"mesh.n": 64})`; raises SceneError."""
-        data = self.model_dump(mode="json", exclude_none=True)
+    def override(self, **values: Any) -> Self:
+        """The scene with some keys replaced, dots written as in `override(**{"mesh.n": 64})`, None to leave a table out.
+
+        Raises SceneError.
+        """
+        data = self.resolved()
         for key, value in values.items():
             _set(data, key, value)
-        return build(data)
+        return _build(data, type(self))
+
+    def full(self) -> FullScene:
+        """The same problem with every block there, those that were absent with no effect.
+
+        Raises SceneError for what the whole model of the paper does not have: several or no contact parts, formulas,
+        regions, other laws than linear compliance with Coulomb friction.
+        """
+        data = self.resolved()
+        d = self.mesh.dim
+        zero = [[0.0] * d for _ in range(d)]
+        problems = []
+        if self.regions:
+            problems.append("regions: only one material can be judged here; leave the table out")
+        if len(self.contacts) != 1 or self.contacts[0].stiffness is None:
+            problems.append("contact: one contact part with a stiffness is needed here")
+        else:
+            contact = self.contacts[0]
+            if contact.exponent != 1 or contact.pressure_limit or contact.heats:
+                problems.append("contact: only linear compliance with a constant conductance can be judged here")
+            if contact.friction and contact.friction != t.FrictionTable(coefficient=contact.friction.coefficient):
+                problems.append("contact.friction: only Coulomb's law with a constant coefficient can be judged here")
+            data["contact"] = contact.model_dump(mode="json", exclude_none=True)
+        if problems:
+            raise SceneError("\n".join(problems))
+        for table in ("elasticity", "viscosity"):
+            data.setdefault(table, {"lame": [0.0, 0.0]})
+        data.setdefault("inertia", {"density": 0.0})
+        heat = data.setdefault("heat", {"conductivity": zero})
+        for table in ("expansion", "heating"):
+            heat.setdefault(table, {"tensor": zero})
+        for holder, key in ((heat, "conductivity"), (heat["expansion"], "tensor"), (heat["heating"], "tensor")):
+            if not isinstance(holder[key], list):
+                holder[key] = [[holder[key] if i == j else 0.0 for j in range(d)] for i in range(d)]
+        data["loads"].setdefault("body", [0.0] * d)
+        return _build(data, FullScene)
 
 
-def _smallest_eigenvalue(matrix: list[list[float]]) -> float:
-    import numpy as np
+class FullScene(Scene):
+    """A scene in which every block is there and every datum is a constant: the paper's whole model."""
 
-    return float(np.linalg.eigvalsh(np.array(matrix))[0])
+    inertia: t.InertiaTable
+    elasticity: t.IsotropicTable
+    viscosity: t.IsotropicTable
+    heat: t.FullHeatTable
+    loads: t.FullLoadsTable
+    supports: t.FullSupportsTable
+    contact: t.FullContactTable
+    initial: t.FullInitialTable = t.FullInitialTable()
+
+
+S = TypeVar("S", bound=Scene)
 
 
 def library() -> list[str]:
@@ -189,6 +175,9 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
         if not equals or not key.strip():
             raise SceneError(f"'{item}' is no override; write table.key=value")
         _set(data, key.strip(), _parse(value.strip()))
+    mesh = data.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) and path.exists():
+        mesh["file"] = str(path.parent / mesh["file"])  # a mesh lies beside its scene
     return build(data)
 
 
@@ -205,13 +194,25 @@ def _set(data: dict[str, Any], key: str, value: Any) -> None:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
             raise SceneError(f"{key}: '{'.'.join(tables[: depth + 1])}' is a value, not a table")
-    data[last] = value
+    if value is None:
+        data.pop(last, None)
+    else:
+        data[last] = value
 
 
 def build(data: dict[str, Any]) -> Scene:
     """A checked scene from plain data; raises SceneError with all problems at once."""
+    return _build(data, Scene)
+
+
+def build_full(data: dict[str, Any]) -> FullScene:
+    """A checked scene in which every block is there, from plain data; raises SceneError."""
+    return _build(data, FullScene)
+
+
+def _build(data: dict[str, Any], kind: type[S]) -> S:
     try:
-        return Scene.model_validate(data)
+        return kind.model_validate(data)
     except ValidationError as error:
         # a union of types gives one error a member: the first tells what is wrong
         first: dict[str, str] = {}
@@ -221,7 +222,7 @@ def build(data: dict[str, Any]) -> Scene:
 
 
 def _where(error: Any) -> list[str]:
-    return [str(part) for part in error["loc"] if not str(part).startswith(("int", "list[", "constrained"))]
+    return [str(part) for part in error["loc"] if not str(part).startswith(KINDS)]
 
 
 def _key(error: Any) -> str:
@@ -251,8 +252,16 @@ def _sentence(error: Any) -> str:
 
 
 def _allowed(where: list[str]) -> list[str]:
+    """The keys of the table at a place; numbers and free names lead into lists and tables of tables."""
     model: Any = Scene
     for part in where:
-        field = model.model_fields.get(part) if hasattr(model, "model_fields") else None
-        model = field.annotation if field else None
-    return sorted(model.model_fields) if hasattr(model, "model_fields") else []
+        fields = getattr(model, "model_fields", {})
+        model = _table(fields[part].annotation) if part in fields else model if part.isdigit() or not fields else None
+    return sorted(getattr(model, "model_fields", {}))
+
+
+def _table(annotation: Any) -> Any:
+    """The table in a type such as ContactTable | list[ContactTable] | None, or None."""
+    if isinstance(annotation, type) and issubclass(annotation, t.Table):
+        return annotation
+    return next((table for table in map(_table, get_args(annotation)) if table is not None), None)

@@ -27,7 +27,7 @@ import sympy as sp
 
 from warmslip.loads import Array, Loads
 from warmslip.problem import mandel
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.tables import PARTS
 
 X, Y, Z, T = sp.symbols("x y z t", real=True)
@@ -128,7 +128,7 @@ def strain(v: Any) -> Any:
     return (gradient + gradient.T) / 2
 
 
-def stress(scene: Scene, u: Any, w: Any, theta: Any) -> Any:
+def stress(scene: FullScene, u: Any, w: Any, theta: Any) -> Any:
     """sigma of (2.1), (d, d), of fields (d, 1), (d, 1) and a scalar."""
     dim, root = len(u), sp.sqrt(2)
     sigma = -theta * sp.Matrix(scene.heat.expansion.tensor)
@@ -142,14 +142,14 @@ def stress(scene: Scene, u: Any, w: Any, theta: Any) -> Any:
     return sigma
 
 
-def read(scene: Scene, fields: Description) -> tuple[Any, Any]:
+def read(scene: FullScene, fields: Description) -> tuple[Any, Any]:
     """The temperature that the momentum balance reads and the velocity that the heat balance reads, by the coupling."""
     coupling = scene.time.coupling
     theta = fields.theta if coupling == "monolithic" else fields.before(fields.theta)
     return theta, fields.before(fields.w) if coupling == "lagged" else fields.w
 
 
-def derive(scene: Scene, fields: Description, points: int = 3) -> Manufactured:
+def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactured:
     """The loads under which `fields` solve the scene's problem; load quadrature has `points` points a direction.
 
     Whether the fields are what they claim to be is for `manufactured.derive` to say. Raises ValueError for a contact part
@@ -194,7 +194,7 @@ def derive(scene: Scene, fields: Description, points: int = 3) -> Manufactured:
         flux = exchange.conductance * (theta - exchange.foundation_temperature) - q.dot(nu)
         law |= {"contact_traction": touch.extra, "contact_flux": on_contact(flux)}
 
-    sides = [part for part in PARTS[scene.mesh.shape] if part != contact.part]
+    sides = [part for part in scene.mesh.parts if part != contact.part]
     held, cooled = scene.supports.displacement, scene.supports.temperature
     loads = Loads(
         body=function(scene.inertia.density * fields.rate(w) - divergence, dim),

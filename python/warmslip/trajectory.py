@@ -30,6 +30,7 @@ class TrajectoryWriter:
         self._file: h5py.File | None = None
         self._writing, self._stored = path is not None, -1
         self._alone = comm.size == 1
+        self._fields = [name for name in ("u", "w", "theta") if getattr(stepper, name) is not None]
         if path is None or comm.rank != 0:
             return
         d, points = discretisation.dim, len(discretisation.surface.weights)
@@ -50,18 +51,19 @@ class TrajectoryWriter:
             )
 
         table("states/time")
-        table("states/u", nodes, d)
-        table("states/w", nodes, d)
-        table("states/theta", nodes)
+        shapes = {"u": (nodes, d), "w": (nodes, d), "theta": (nodes,)}
+        for name in self._fields:
+            table(f"states/{name}", *shapes[name])
         table("steps/time")
         for name in REPORT:
             table(f"steps/{name}")
         table("steps/friction_traction", d)
         for name in LEDGER:
             table(f"ledger/{name}")
-        table("contact/force", points, d)
-        table("contact/displacement", points, d)
-        table("contact/status", points, dtype="i1")
+        if points:
+            table("contact/force", points, d)
+            table("contact/displacement", points, d)
+            table("contact/status", points, dtype="i1")
 
     def _append(self, name: str, value: Any) -> None:
         assert self._file is not None
@@ -72,7 +74,7 @@ class TrajectoryWriter:
     def _state(self) -> None:
         stepper = self._stepper
         self._stored = stepper.cost.steps
-        fields = {name: self._d.field(getattr(stepper, name)) for name in ("u", "w", "theta")}
+        fields = {name: self._d.field(getattr(stepper, name)) for name in self._fields}
         if self._file is None:
             return
         self._append("states/time", stepper.time)
@@ -90,10 +92,11 @@ class TrajectoryWriter:
             self._append("steps/friction_traction", report.friction_traction)
             for name in LEDGER:
                 self._append(f"ledger/{name}", getattr(report.ledger, name))
-            shape = (-1, self._d.dim)
-            self._append("contact/force", np.reshape(stepper.contact_force, shape))
-            self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
-            self._append("contact/status", stepper.status)
+            if len(self._d.surface.weights):
+                shape = (-1, self._d.dim)
+                self._append("contact/force", np.reshape(stepper.contact_force, shape))
+                self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
+                self._append("contact/status", stepper.status)
             self._file.flush()
         if self._writing and stepper.cost.steps % scene.output.every == 0:
             self._state()
@@ -110,15 +113,18 @@ class TrajectoryWriter:
         if self._writing and (kind is None or self._alone):
             if self._stored != self._stepper.cost.steps:
                 self._state()
-            mises = self._d.mises(self._stepper)
-            if self._file is not None:
+            mises = self._d.mises(self._stepper) if self._d.problem.moves else None
+            if self._file is not None and mises is not None:
                 self._file["fields/mises"] = mises
         if self._file is not None:
             self._file.close()
 
 
 class Trajectory:
-    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), `ledger`, `contact`, `steps`."""
+    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), `ledger`, `contact`, `steps`.
+
+    A field that the scene does not have is None.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -141,17 +147,17 @@ class Trajectory:
     @property
     def u(self) -> Any:
         """Displacement, (states, nodes, d), read when indexed."""
-        return self._file["states/u"]
+        return self._file.get("states/u")
 
     @property
     def w(self) -> Any:
         """Velocity, (states, nodes, d)."""
-        return self._file["states/w"]
+        return self._file.get("states/w")
 
     @property
     def theta(self) -> Any:
         """Temperature, (states, nodes)."""
-        return self._file["states/theta"]
+        return self._file.get("states/theta")
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""

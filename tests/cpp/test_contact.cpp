@@ -38,7 +38,7 @@ Body<d> random_body(unsigned seed, int points, double friction, double stiffness
   Eigen::MatrixXd root(n, n);
   for (double& entry : root.reshaped()) entry = random();
   Body<d> body{root * root.transpose() / n + Eigen::MatrixXd::Identity(n, n),
-               {{{stiffness}, {friction}}, 0.1, {}, Eigen::VectorXd(n)}};
+               {{{{stiffness}, {friction}}}, 0.1, {}, Eigen::VectorXd(n)}};
   for (double& entry : body.problem.free) entry = random();
   for (int i = 0; i < points; ++i) {
     const Point<d> normal = random.point<d>().normalized(), displacement = 0.1 * random.point<d>();
@@ -57,10 +57,10 @@ double defect(const Body<d>& body, const ContactSolution<d>& s) {
     const auto& point = body.problem.points[i];
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = s.force.template segment<d>(row) / point.weight, w = velocity.template segment<d>(row);
-    const double p = body.problem.law.compliance.stiffness *
+    const double p = body.problem.laws[0].compliance.stiffness *
                      std::max(0.0, (point.displacement + body.problem.step * w).dot(point.normal) - point.gap);
     const Point<d> lambda = f - f.dot(point.normal) * point.normal, slip = w - w.dot(point.normal) * point.normal;
-    const double bound = body.problem.law.friction.coefficient * p;
+    const double bound = body.problem.laws[0].friction.coefficient * p;
     worst = std::max({worst, std::abs(f.dot(point.normal) - p), lambda.norm() - bound,
                       std::abs(lambda.dot(slip) - bound * slip.norm())});
   }

@@ -32,7 +32,7 @@ struct Paper {
     const Material<d> material{1, isotropic<d>(0.2, 0.9), isotropic<d>(10, 5), id, id, heating * id};
     std::vector<std::string> cooled{"top", "left", "right"};
     if (d == 3) cooled.insert(cooled.end(), {"front", "back"});
-    return {std::move(mesh), material, {"top"}, cooled, "bottom", {{1e4}, {0.2}}, {quadrature}, 1};
+    return {std::move(mesh), {material}, {}, {"top"}, cooled, {{"bottom", ContactLaw{{1e4}, {0.2}}, {quadrature}, 1}}};
   }
   explicit Paper(int n, double heating = 1, int quadrature = 0)
       : mesh(unit_box(n)),

@@ -48,7 +48,7 @@ def test_operators_equal_scipy(small: MakeScene, reading: str) -> None:
     for name, letter in names.items():
         assert relative(scipy_of(getattr(own, name)), theirs[letter]) <= 1e-13, name
     vector_mass = sp.kron(theirs["M"], np.eye(2))
-    assert relative(scipy_of(own.vector_mass.convert("aij", PETSc.Mat())), vector_mass) <= 1e-13
+    assert relative(scipy_of(own.inertia.convert("aij", PETSc.Mat())), vector_mass) <= 1e-13
     # the operators of a step: supports are rows and columns of the identity
     free = np.ones(2 * (n + 1) ** 2)
     free[own.clamped] = 0

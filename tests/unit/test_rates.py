@@ -157,14 +157,18 @@ def test_readings_judge_the_claims(tmp_path: Path) -> None:
         case("slow_0", order=0.5),
         case("slow_10", order=0.5, larger=0.5),
     ]
+    cold, hot = study_rows(), study_rows(larger=2)
+    hot[-1]["norm_theta_L2"] = 0.5 * cold[-1]["norm_theta_L2"]  # three of the four claims hold
+    paths += [write(tmp_path / f"torn_{t}_staggered.csv", rows) for t, rows in ((0, cold), (10, hot))]
     paths.append(write(tmp_path / "good_10_lagged.csv", study_rows(larger=0.1)))
-    good, slow = readings.table(paths)
+    good, slow, torn = readings.table(paths)
     assert (good["reading"], slow["reading"]) == ("good", "slow")
     for temperature in (0, 10):
         assert (good[f"ticks_u_theta_{temperature}"], good[f"linear_u_theta_{temperature}"]) == ("yes", "yes")
         assert (slow[f"ticks_u_theta_{temperature}"], slow[f"linear_u_theta_{temperature}"]) == ("no", "no")
     assert (good["all_larger"], good["stress_ratio"]) == ("yes", 2)
     assert (slow["all_larger"], slow["temperature_larger"]) == ("no", "no")
+    assert (torn["all_larger"], torn["deformation_larger"], torn["temperature_larger"]) == ("no", "yes", "no")
 
 
 def test_verdict_of_a_study(tmp_path: Path) -> None:

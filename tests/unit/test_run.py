@@ -214,6 +214,18 @@ def test_loose_iterations_are_seen(small: MakeScene, options: dict[str, str], fi
     assert result.summary["failure"]["heat" if field == "heat" else "force"] > 1e-8
 
 
+def test_loose_iterations_are_seen_where_every_sum_closes(small: MakeScene, options: dict[str, str]) -> None:
+    """A floating body on a mesh that is its own mirror image, pulled apart: no sum of forces or moments sees the defect."""
+    for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_rtol": "1e-2"}.items():
+        options[f"momentum_{key}"] = value
+    apart = {"loads__body": [0.0, 0.0], "loads__traction": {"left": [-1.0, 0.0], "right": [1.0, 0.0]}}
+    free = {"supports__displacement": [], "heat__expansion__tensor": [[0.0, 0.0], [0.0, 0.0]], "contact__gap": 1.0}
+    scene = small(mesh__n=16, mesh__diagonal="crisscross", time__steps=1, time__end=0.125, **apart, **free)
+    result = warmslip.run(scene, backend="petsc")
+    assert result.outcome == "identity_violated"
+    assert result.summary["failure"]["force"] > 1e-8
+
+
 @pytest.mark.parametrize(("speed", "outcome"), [(1.0, "right"), (1e10, "precision_lost")])
 def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float, outcome: str) -> None:
     """Its displacement has sixteen digits; what is left of them in the strain is stated."""
@@ -240,6 +252,18 @@ def test_stiffness_that_is_not_touched_excuses_nothing(small: MakeScene) -> None
         result = warmslip.run(small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, **needle))
         assert result.outcome == "identity_violated"
         assert result.summary["failure"]["energy_floor"] == 0
+
+
+def test_stiffness_that_is_hardly_touched_excuses_little(small: MakeScene) -> None:
+    """A needle that stands on a foundation whose law is known to 1e-6: its energy, nearly all of shear, is not excused."""
+    standing = {"mesh__lengths": [1e-4, 1.0], "loads__traction": {"left": [1.4, 0.0], "right": [-0.8, 0.0]}}
+    result = warmslip.run(
+        small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, contact__stiffness=2e12, **standing)
+    )
+    assert result.outcome == "identity_violated"
+    failure = result.summary["failure"]
+    assert failure["law_floor"] > 1e-7 > 100 * failure["energy_floor"]
+    assert 1e-9 < failure["energy"] < 4 * failure["law_floor"]
 
 
 def test_an_operator_without_inverse_is_refused(small: MakeScene) -> None:

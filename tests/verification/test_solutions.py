@@ -131,6 +131,10 @@ def test_what_the_paper_law_alone_is_made_of(dim: int) -> None:
         direction = w[:, :-1] / np.linalg.norm(w[:, :-1], axis=1)[:, None]
         assert pressure.min() > 0.1
         assert np.allclose(traction[:, -1], pressure, rtol=1e-9)
+        slope = [(solution.theta(x + 1e-6 * e, t) - solution.theta(x - 1e-6 * e, t)) / 2e-6 for e in np.eye(dim)]
+        leaving = np.array(scene.heat.conductivity)[-1] @ np.array(slope)  # q . nu, nu downwards
+        wall = theta - leaving / contact.heat_exchange.conductance
+        assert np.abs(loads.foundation_temperature(x, t) - wall).max() <= 1e-6 * np.abs(wall).max()
         assert np.allclose(traction[:, :-1], -contact.friction.coefficient * pressure[:, None] * direction, rtol=1e-9)
 
 

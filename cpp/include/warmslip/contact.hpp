@@ -1,32 +1,78 @@
-// The contact law at one point, as values and pure functions: normal compliance (2.8) and Coulomb friction (2.9).
+// The contact laws at one point, as values and pure functions: normal compliance (2.8), friction (2.9) and what the
+// contact does to the heat.
 #pragma once
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
 
 #include "warmslip/tensor.hpp"
 
 namespace warmslip {
 
-/// p_nu(r) = stiffness max(r, 0), the pressure on a penetration r = u_nu - g.
-struct NormalCompliance {
-  double stiffness;  ///< c_nu, stress per length
+constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-  double pressure(double r) const { return stiffness * std::max(r, 0.0); }
-  double tangent(double r) const { return r > 0 ? stiffness : 0.0; }
+/// p_nu(r) = min(stiffness max(r, 0)^exponent, most), the pressure on a penetration r = u_nu - g.
+struct NormalCompliance {
+  double stiffness = 0;     ///< c_nu, stress per length^exponent
+  double exponent = 1;      ///< >= 1, dimensionless
+  double most = unlimited;  ///< stress
+  /// A law of the user's in its place: pressure, derivative and energy (P' = p_nu, P(0) = 0) of r; p_nu(r) = 0 for r <=
+  /// 0.
+  std::function<std::array<double, 3>(double)> custom{};
+
+  double pressure(double r) const;
+  double tangent(double r) const;
   /// P with P' = p_nu and P(0) = 0, energy per area.
-  double energy(double r) const { return 0.5 * stiffness * std::max(r, 0.0) * std::max(r, 0.0); }
+  double energy(double r) const;
+  bool linear() const { return !custom && exponent == 1 && most == unlimited; }
+  /// The tangent that sets the scale of a step whose penetration would be `r` without contact.
+  double scale(double r) const { return linear() ? stiffness : tangent(r); }
 };
 
-/// p_tau(r) = coefficient p_nu(r), the friction bound.
-struct CoulombFriction {
-  double coefficient;  ///< mu_tau, dimensionless
+/// A friction bound and its derivatives.
+struct FrictionBound {
+  double value, by_pressure, by_speed;
+};
+
+/// |sigma_tau| <= min(cohesion + mu(|w_tau|) p_nu, limit): Coulomb's law, Tresca's (cohesion alone), both, or one that
+/// is cut off. mu falls from `coefficient` at rest to `kinetic` at speeds far above `speed`.
+struct Friction {
+  double coefficient = 0;     ///< mu_tau, dimensionless
+  double cohesion = 0;        ///< stress, borne without any pressure
+  double limit = unlimited;   ///< stress
+  double kinetic = 0;         ///< dimensionless; counts where speed > 0
+  double speed = 0;           ///< velocity; 0: mu does not depend on it
+  double regularisation = 0;  ///< velocity; > 0: the traction is bound w_tau / (|w_tau|^2 + regularisation^2)^(1/2)
+  /// A law of the user's in its place: bound, derivatives by pressure and speed, of (pressure, speed).
+  std::function<std::array<double, 3>(double, double)> custom{};
+
+  FrictionBound bound(double pressure, double slip_speed) const;
+  /// Whether a traction may be borne at all.
+  bool present() const { return custom || coefficient > 0 || cohesion > 0; }
+  /// Whether the bound is a constant multiple of the pressure, or a constant.
+  bool linear() const { return !custom && speed == 0 && limit == unlimited && regularisation == 0; }
 };
 
 struct ContactLaw {
   NormalCompliance compliance;
-  CoulombFriction friction;
+  Friction friction;
 
-  double bound(double r) const { return friction.coefficient * compliance.pressure(r); }
+  FrictionBound bound(double r, double slip_speed) const { return friction.bound(compliance.pressure(r), slip_speed); }
+  /// Whether the generalised derivative depends on the statuses alone.
+  bool piecewise_linear() const { return compliance.linear() && friction.linear(); }
+};
+
+/// Heat that the contact itself conducts and makes, beside a constant k_c: q . nu = per_pressure p_nu (theta - theta_F)
+/// - friction_share |sigma_tau . w_tau|.
+struct ContactHeat {
+  double per_pressure = 0;    ///< conductance per stress
+  double friction_share = 0;  ///< of the frictional heat, into the body; in [0, 1]
+
+  bool present() const { return per_pressure > 0 || friction_share > 0; }
 };
 
 enum class Status : std::int8_t { open, stick, slip };
@@ -39,23 +85,41 @@ struct ContactPoint {
   double penetration;     ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
   Point<d> displacement;  ///< u_{n-1}, for the round-off floor of r alone
   double gap;             ///< g_n
+  std::size_t law = 0;    ///< which of the problem's laws holds here
 };
 
 /// Residual and generalised derivative of the law, written so that zero is the law itself (Alart & Curnier,
 /// Comput. Methods Appl. Mech. Eng. 92, 1991): with force lambda and velocity w,
 ///   normal      alpha (lambda_nu - weight p_nu(r + k w_nu))
-///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + beta w_tau),   T = weight p_tau(r + k w_nu)
-/// alpha (dimensionless) and beta (force per velocity) scale the rows; they do not move the zeros.
+///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + beta w_tau),   T = weight times the friction bound
+/// alpha (dimensionless) and beta (force per velocity) scale the rows; they do not move the zeros. Regularised friction
+/// has lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
 template <int d>
 struct PointResidual {
   Point<d> value;
   Tensor2<d> by_force, by_velocity;
   Status status;
-  int slip_sign;  ///< d = 2: sign of the slip along the tangent; the derivative depends on (status, slip_sign) alone
+  int slip_sign;  ///< d = 2: sign of the slip along the tangent
+  bool touching;  ///< r > 0
+
+  /// Of a piecewise linear law the derivative (d = 2) depends on this alone.
+  int key() const { return (touching ? 100 : 0) + static_cast<int>(status) * 10 + slip_sign; }
 };
 
 template <int d>
 PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, double alpha, double beta,
                           const Point<d>& force, const Point<d>& velocity);
+
+/// How far (force, velocity) is from the friction law at one point whose bound is `bound` (force): the force beyond the
+/// bound and the power that is missing, or for regularised friction the distance in force.
+struct FrictionDefect {
+  double force, power;
+};
+template <int d>
+FrictionDefect friction_defect(const Friction& friction, double bound, const Point<d>& force,
+                               const Point<d>& slip_velocity);
+
+/// Power that friction takes from the body: bound |w_tau|, or what the regularised law leaves of it.
+double friction_power(const Friction& friction, double bound, double slip_speed);
 
 }  // namespace warmslip

@@ -21,11 +21,13 @@ enum class Stage : std::int8_t { none, newton, line_search, fixed_point, enumera
 
 template <int d>
 struct ContactProblem {
-  ContactLaw law;
+  std::vector<ContactLaw> laws;
   double step;  ///< k, time
   std::vector<ContactPoint<d>> points;
   Eigen::VectorXd free;  ///< (d points), velocity without contact force
   double scale = 0;      ///< a force of the problem's size, such as stops `free`: what no force is compared with
+
+  const ContactLaw& law(std::size_t point) const { return laws[points[point].law]; }
 };
 
 template <int d>
@@ -42,14 +44,14 @@ struct ContactSolution {
 
 /// How far (force, velocity) is from the law, relative to the largest force and the largest free velocity: the worst of
 /// |lambda_nu - p_nu(r_n)|, (|lambda_tau| - T)^+ and T |w_tau| - lambda_tau . w_tau over the points. `floor` receives
-/// what the rounding of r alone can cause where it may touch: no digits of the pressure below c_nu eps (|u| + k |free|)
-/// can be had.
+/// what the rounding of r alone can cause where it may touch: no digits of the pressure below p_nu' eps (|u| + k
+/// |free|) can be had.
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
                     double* floor);
 
-/// One body, law and step size. Remembers the dense tangent while the statuses stay (d = 2), which is most steps of
-/// most runs.
+/// One body, laws and step size. Remembers the dense tangent while the statuses stay (piecewise linear laws, d = 2),
+/// which is most steps of most runs.
 template <int d>
 class ContactSolver {
  public:
@@ -58,6 +60,8 @@ class ContactSolver {
   /// Solves from the guess `force` (d points). Never throws on failure to converge: `converged` says so.
   ContactSolution<d> solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force);
 
+  /// Drops the remembered tangent: the next solve does what a new solver would, to the last bit.
+  void forget() { factored_.clear(); }
   const Eigen::MatrixXd& compliance() const { return compliance_; }
   /// The force a point that stops the velocities `free` must bear.
   double scale(const Eigen::VectorXd& free) const { return spectral_ > 0 ? free.cwiseAbs().maxCoeff() / spectral_ : 0; }

@@ -8,7 +8,8 @@
 
 namespace warmslip {
 
-/// The same on every rank: contact nodes are few. Clamped nodes are left out, their reaction is the support's.
+/// The points of all contact parts with a law, the same on every rank: contact nodes are few. Clamped nodes are left
+/// out, their reaction is the support's.
 template <int d>
 class ContactSurface {
  public:
@@ -19,26 +20,32 @@ class ContactSurface {
   const RealTable<d>& positions() const { return positions_; }  ///< (points, d)
   const RealTable<d>& normals() const { return normals_; }      ///< (points, d), outward
   const Eigen::VectorXd& weights() const { return weights_; }   ///< (points), area
-  bool nodal() const { return nodal_; }
+  /// Which of the problem's contact parts a point lies on.
+  std::size_t contact(Eigen::Index point) const { return contacts_[static_cast<std::size_t>(point)]; }
 
   /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d
   /// nodes).
   std::vector<PetscInt> unknowns(int block) const;
-  /// Displacement-like values of the contact nodes, (d nodes), on every rank.
+  /// Global numbers of the contact nodes, (nodes).
+  std::vector<PetscInt> global_nodes() const;
+  /// Values of the contact nodes on every rank: (d nodes) of a displacement-like vector, (nodes) of a temperature.
   Eigen::VectorXd nodal_values(Vec v) const;
   /// Values at the contact points, (d points), and the transpose: forces at the points as nodal forces.
   Eigen::VectorXd at_points(const Eigen::VectorXd& nodal) const;
   Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
   /// Compliance of the points from the compliance of the nodes.
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
+  /// The same for scalars, one value a node and a point: (points, nodes).
+  const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
 
  private:
   const Layout<d>& layout_;
   std::vector<Index> nodes_;
+  std::vector<std::size_t> contacts_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
   RealTable<d> positions_, normals_;
   Eigen::VectorXd weights_;
-  bool nodal_;
 };
 
 }  // namespace warmslip

@@ -6,23 +6,26 @@
 
 namespace warmslip {
 
-/// What the ledger reads of one time level.
+/// What the ledger reads of one time level; what belongs to an absent block is null or empty.
 struct Level {
-  VecHandle u, w, theta;                    ///< displacement, velocity, temperature
-  VecHandle mass_w, elastic_u, mass_theta;  ///< M w (without rho), A u, M theta
-  VecHandle expansion_theta, heating_w;     ///< G theta, E w
-  Eigen::VectorXd contact_u, gap;           ///< u at the contact points (d points), g (points)
+  VecHandle u, w, theta;                      ///< displacement, velocity, temperature
+  VecHandle momentum, elastic_u, mass_theta;  ///< rho M w, A u, M theta
+  VecHandle expansion_theta, heating_w;       ///< G theta, E w
+  Eigen::VectorXd contact_u, gap;             ///< u at the contact points (d points), g (points)
+  Eigen::VectorXd contact_theta;              ///< theta at the contact points, where the contact makes or leads heat
 };
 
-/// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0.
+/// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0. Those of
+/// absent blocks are zero.
 struct Ledger {
   double kinetic, elastic, contact;  ///< stored at the end of the step
   double kinetic_change, elastic_change, contact_change;
   double inertia_damping, elastic_damping, contact_damping;  ///< backward Euler's own dissipation
   double viscous, friction;
-  double load_work, expansion_work, gap_work;
-  double heat_change, heat_damping, conducted, exchanged, supplied, heating;  ///< the same balance for theta
-  double energy_residual, heat_residual, force_residual, law_residual;        ///< relative to the largest term
+  double load_work, expansion_work, gap_work, support_work;  ///< the last: of the reactions of moving supports
+  /// the same balance for theta; `held`: of parts held at a temperature
+  double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, held;
+  double energy_residual, heat_residual, force_residual, law_residual;  ///< relative to the largest term
   /// What rounding alone can cause, likewise: of the contact law, of the law's terms in the energy, of the internal
   /// forces (a body that moves far for its deformation has no digits left in its strain).
   double law_floor, energy_floor, force_floor;
@@ -35,6 +38,7 @@ struct StepInputs {
   Eigen::VectorXd contact_force;   ///< at the points, (d points)
   Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the law's scale
   double contact_scale;            ///< and a force of that size
+  Eigen::VectorXd foundation;      ///< theta_F at the points, where the conductance depends on the pressure
 };
 
 template <int d>
@@ -51,21 +55,34 @@ class Bookkeeper {
   void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out) const;
 
  private:
-  void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  double heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  void resultants(const Level& before, const Level& after, const StepInputs& inputs, double heat_energy,
-                  Ledger& ledger);
+  void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, conducted_, exchanged_, contact_force_;    // B w, D theta, J theta, E lambda
+  VecHandle viscous_w_, contact_force_;             // B w, E lambda
+  VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
   Eigen::VectorXd elastic_rows_, viscous_rows_, conduction_rows_;  // sums of |entries|, for what rounding explains
-  std::vector<PetscInt> unknowns_;                                 // of contact, relative to the owned range
+  std::vector<PetscInt> unknowns_, nodes_;                         // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;                             // a node
   Point<d> centroid_;                                              // moments are taken about it
 };
+
+/// What the contact itself does to the heat at every contact point, see ContactHeat.
+struct ContactFlow {
+  Eigen::VectorXd conductance;  ///< omega per_pressure p_nu
+  Eigen::VectorXd friction;     ///< share of the frictional power, into the body
+};
+template <int d>
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap);
+
+/// y = a x; nothing when there is no such operator.
+void multiply(Mat a, Vec x, Vec y);
 
 }  // namespace warmslip

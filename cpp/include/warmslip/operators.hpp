@@ -9,21 +9,22 @@
 
 namespace warmslip {
 
-/// Matrices in the paper's letters, without boundary conditions. w and u have block size d, theta 1.
+/// Matrices in the paper's letters, without boundary conditions; those of absent blocks are null. w and u have block
+/// size d, theta 1.
 template <int d>
 struct Operators {
   Operators(const Layout<d>& layout, const Problem<d>& problem);
 
-  MatHandle mass;                 ///< (theta, eta), consistent
-  MatHandle vector_mass;          ///< rho (w, v), the same matrix for every component
+  MatHandle inertia;              ///< rho (w, v), one scalar matrix for all components
   MatHandle elasticity;           ///< a(u, v)
   MatHandle viscosity;            ///< b(w, v)
+  MatHandle mass;                 ///< (theta, eta), consistent, times the capacity
   MatHandle conductivity;         ///< d(theta, eta)
   MatHandle expansion;            ///< m(theta, v): rows v, columns theta
   MatHandle heating;              ///< e(w, eta): rows eta, columns w
   MatHandle exchange;             ///< int k_c theta eta over Gamma_C, consistent
-  std::vector<PetscInt> clamped;  ///< global scalar indices with u = 0, owned by this rank
-  std::vector<PetscInt> cooled;   ///< global nodes with theta = 0, owned by this rank
+  std::vector<PetscInt> clamped;  ///< global scalar indices with given displacement, owned by this rank
+  std::vector<PetscInt> cooled;   ///< global nodes with given temperature, owned by this rank
 };
 
 /// rho M / k + B + k A with the clamped rows and columns replaced by the identity.

@@ -58,7 +58,8 @@ VecHandle duplicate(Vec like);
 /// Unknowns a node.
 Eigen::Index block_size(Vec v);
 
-/// A view of a vector's own entries as an Eigen array, for reading or writing; returned to PETSc on destruction.
+/// A view of a vector's own entries as an Eigen array, for reading or writing; returned to PETSc on destruction. Of no
+/// vector: no entries.
 class Values {
  public:
   explicit Values(Vec vec);

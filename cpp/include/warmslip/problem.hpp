@@ -1,6 +1,8 @@
-// A problem: a mesh, its material, its supports and its contact part. Values only.
+// A problem: a mesh, its materials, its supports and its contact parts. Values only; what is absent is no part of the
+// problem: no field, no matrix, no solve.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,36 +13,69 @@ namespace warmslip {
 
 template <int d>
 struct Material {
-  double density;           ///< rho
-  Tensor4<d> elasticity;    ///< F of (2.1), Mandel form
-  Tensor4<d> viscosity;     ///< A of (2.1), Mandel form
-  Tensor2<d> conductivity;  ///< K of (2.2)
-  Tensor2<d> expansion;     ///< M of (2.1)
-  Tensor2<d> heating;       ///< R of (2.4)
+  double density = 0;                      ///< rho; 0 leaves the motion quasistatic
+  std::optional<Tensor4<d>> elasticity;    ///< F of (2.1), Mandel form
+  std::optional<Tensor4<d>> viscosity;     ///< A of (2.1), Mandel form
+  std::optional<Tensor2<d>> conductivity;  ///< K of (2.2); absent: no heat
+  std::optional<Tensor2<d>> expansion;     ///< M of (2.1)
+  std::optional<Tensor2<d>> heating;       ///< R of (2.4)
+  double capacity = 1;                     ///< of heat, per volume and temperature
 };
 
-/// Quadrature of the contact law on Gamma_C: `points` = 0 is the vertex rule (nodal), n > 0 Gauss's with n points an
+/// Quadrature of the contact law on a part: `points` = 0 is the vertex rule (nodal), n > 0 Gauss's with n points an
 /// edge.
 struct ContactQuadrature {
   int points = 0;
 };
 
+/// One part of Gamma_C; without a law it only exchanges heat.
+struct ContactPart {
+  std::string part;
+  std::optional<ContactLaw> law;
+  ContactQuadrature quadrature;
+  double conductance = 0;  ///< k_c of (2.10)
+  ContactHeat heat{};
+};
+
 template <int d>
 struct Problem {
   std::shared_ptr<const Mesh<d>> mesh;
-  Material<d> material;
-  std::vector<std::string> clamped;  ///< parts with u = 0 (2.5)
-  std::vector<std::string> cooled;   ///< parts with theta = 0 (2.7)
-  std::string contact_part;          ///< Gamma_C
-  ContactLaw law;
-  ContactQuadrature quadrature;
-  double conductance;  ///< k_c of (2.10)
+  std::vector<Material<d>> materials;
+  std::vector<int> regions;          ///< material of every cell; empty: the first one everywhere
+  std::vector<std::string> clamped;  ///< parts with given displacement (2.5)
+  std::vector<std::string> cooled;   ///< parts with given temperature (2.7)
+  std::vector<ContactPart> contacts;
+
+  const Material<d>& material(Index cell) const {
+    return materials[regions.empty() ? 0 : static_cast<std::size_t>(regions[static_cast<std::size_t>(cell)])];
+  }
+  /// Whether any material has the block, e.g. `has(&Material<d>::viscosity)`.
+  template <class Block>
+  bool has(std::optional<Block> Material<d>::*block) const {
+    for (const auto& m : materials)
+      if (m.*block) return true;
+    return false;
+  }
+  bool inertial() const {
+    for (const auto& m : materials)
+      if (m.density > 0) return true;
+    return false;
+  }
+  /// Whether there is a velocity, and a temperature, to solve for.
+  bool moves() const { return inertial() || has(&Material<d>::elasticity) || has(&Material<d>::viscosity); }
+  bool conducts() const { return has(&Material<d>::conductivity); }
+  /// Whether some contact part conducts or makes heat by its forces.
+  bool contact_heats() const {
+    for (const auto& c : contacts)
+      if (c.heat.present()) return true;
+    return false;
+  }
 };
 
 /// Cauchy stress (2.1) of every cell at its centroid, (cells, d*d) row-major, from nodal u, w (nodes, d) and theta
-/// (nodes).
+/// (nodes); a field the problem does not have may be empty.
 template <int d>
-RealTable<d * d> stress(const Mesh<d>& mesh, const Material<d>& material, const RealTable<d>& u, const RealTable<d>& w,
+RealTable<d * d> stress(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,
                         const Eigen::VectorXd& theta);
 
 }  // namespace warmslip

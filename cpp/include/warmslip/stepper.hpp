@@ -24,10 +24,15 @@ struct StepperOptions {
   double floor_bound = 1e-6;     ///< nor is one whose contact law can be evaluated no better than this
 };
 
-/// Load vectors of one step: `force` (f, v), `heat` (q, eta) with k_c theta_F on Gamma_C included, `gap` g (points).
+/// Data of one step: load vectors `force` (f, v) and `heat` (q, eta), k_c theta_F included, `gap` g (points); what
+/// belongs to an absent block is null or empty.
 struct StepLoads {
-  Vec force, heat;
-  Eigen::VectorXd gap;
+  Vec force = nullptr, heat = nullptr;
+  Eigen::VectorXd gap{};
+  /// Where supports move or are warm: vectors whose entries at the fixed unknowns are the given velocity and
+  /// temperature; null: zero.
+  Vec support_velocity = nullptr, support_temperature = nullptr;
+  Eigen::VectorXd foundation{};  ///< theta_F (points), where the conductance depends on the pressure
 };
 
 template <int d>
@@ -60,8 +65,13 @@ class Stepper {
   Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
           const ContactSurface<d>& surface, StepperOptions options);
 
-  /// Sets the initial data (2.11); `gap` at the contact points.
+  /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
+  /// goes on passes the contact forces and statuses of its last step as well: the next step is then the same to the
+  /// last bit as that of a stepper that was told to `forget` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
+  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status);
+  /// Drops what is remembered of earlier steps beside the state.
+  void forget();
   /// One step. When the outcome is not `right`, the state is the last good one.
   StepReport<d> advance(const StepLoads& loads);
 
@@ -71,23 +81,28 @@ class Stepper {
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
   const Cost& cost() const { return cost_; }
-  Factor& momentum_factor() { return *momentum_; }
-  Factor* heat_factor() { return heat_.get(); }  ///< nullptr when monolithic
+  Factor* momentum_factor() { return momentum_.get(); }  ///< nullptr without motion
+  Factor* heat_factor() { return heat_.get(); }          ///< nullptr without heat and when monolithic
   std::string solver() const;
 
  private:
   StepReport<d> attempt(const StepLoads& loads);
-  void momentum_right_side(const StepLoads& loads, Vec out);
+  void momentum_right_side(const StepLoads& loads);
+  Eigen::VectorXd reduce(Vec right);
+  void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
+  StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
   bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
                      ContactSolution<d>& solution);
-  void solve_heat(const StepLoads& loads, Vec heating_w, Vec theta);
+  void solve_heat(const StepLoads& loads, Vec heating_w);
   Outcome judge(const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
   bool refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
-  static void zero(Vec v, const std::vector<PetscInt>& indices);
+  static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
+  bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
+  bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;
@@ -100,7 +115,8 @@ class Stepper {
   std::unique_ptr<ContactSolver<d>> contact_;
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
-  Eigen::VectorXd free_;  // velocity of the contact points without contact force
+  std::vector<bool> fixed_contact_;  // of the contact nodes, those whose temperature is held
+  Eigen::VectorXd free_;             // velocity of the contact points without contact force
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   double time_ = 0;

@@ -21,13 +21,14 @@ std::set<Index> nodes_of(const Mesh<d>& mesh, const std::vector<std::string>& pa
 }  // namespace
 
 template <int d>
-ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem)
-    : layout_(layout), nodal_(problem.quadrature.points == 0) {
+ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem) : layout_(layout) {
   const Mesh<d>& mesh = layout.mesh();
-  const Facets<d>& facets = mesh.part(problem.contact_part);
   const std::set<Index> clamped = nodes_of(mesh, problem.clamped);
+  std::vector<std::string> touching;
+  for (const ContactPart& contact : problem.contacts)
+    if (contact.law) touching.push_back(contact.part);
   std::map<Index, Eigen::Index> number;
-  for (const Index node : nodes_of(mesh, {problem.contact_part}))
+  for (const Index node : nodes_of(mesh, touching))
     if (!clamped.contains(node)) {
       number[node] = static_cast<Eigen::Index>(nodes_.size());
       nodes_.push_back(node);
@@ -35,42 +36,51 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
 
   std::vector<Point<d>> positions, normals;
   std::vector<double> weights;
-  std::vector<Eigen::Triplet<double>> shape;
-  std::map<Index, std::vector<std::size_t>> at_node;  // vertex rule: points that differ in normal only stay apart
+  std::vector<Eigen::Triplet<double>> shape, scalar_shape;
   const auto add_shape = [&](std::size_t point, Index node, double value) {
-    if (const auto found = number.find(node); found != number.end())
-      for (int a = 0; a < d; ++a)
-        shape.emplace_back(static_cast<int>(point) * d + a, static_cast<int>(found->second) * d + a, value);
+    const auto found = number.find(node);
+    if (found == number.end()) return;
+    const int row = static_cast<int>(point), column = static_cast<int>(found->second);
+    scalar_shape.emplace_back(row, column, value);
+    for (int a = 0; a < d; ++a) shape.emplace_back(row * d + a, column * d + a, value);
   };
-  const auto new_point = [&](const Point<d>& x, const Point<d>& nu, double weight) {
-    positions.push_back(x);
-    normals.push_back(nu);
-    weights.push_back(weight);
-    return weights.size() - 1;
-  };
-  const Rule rule = simplex_rule(d - 1, nodal_ ? 1 : problem.quadrature.points);
-  for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
-    const Point<d> area = area_normal(mesh, facets, f), nu = area.normalized();
-    if (nodal_) {
-      for (int i = 0; i < d; ++i) {
-        const Index node = facets.nodes(f, i);
-        if (!number.contains(node)) continue;
-        auto& here = at_node[node];
-        const auto same =
-            std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
-        if (same != here.end()) {
-          weights[*same] += area.norm() / d;
-        } else {
-          here.push_back(new_point(mesh.nodes.row(node).transpose(), nu, area.norm() / d));
-          add_shape(here.back(), node, 1);
+  for (std::size_t part = 0; part < problem.contacts.size(); ++part) {
+    const ContactPart& contact = problem.contacts[part];
+    if (!contact.law) continue;
+    const auto new_point = [&](const Point<d>& x, const Point<d>& nu, double weight) {
+      positions.push_back(x);
+      normals.push_back(nu);
+      weights.push_back(weight);
+      contacts_.push_back(part);
+      return weights.size() - 1;
+    };
+    const bool nodal = contact.quadrature.points == 0;
+    const Rule rule = simplex_rule(d - 1, nodal ? 1 : contact.quadrature.points);
+    std::map<Index, std::vector<std::size_t>> at_node;  // vertex rule: points that differ in normal only stay apart
+    const Facets<d>& facets = mesh.part(contact.part);
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+      const Point<d> area = area_normal(mesh, facets, f), nu = area.normalized();
+      if (nodal) {
+        for (int i = 0; i < d; ++i) {
+          const Index node = facets.nodes(f, i);
+          if (!number.contains(node)) continue;
+          auto& here = at_node[node];
+          const auto same =
+              std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
+          if (same != here.end()) {
+            weights[*same] += area.norm() / d;
+          } else {
+            here.push_back(new_point(mesh.nodes.row(node).transpose(), nu, area.norm() / d));
+            add_shape(here.back(), node, 1);
+          }
         }
-      }
-    } else {
-      for (Eigen::Index q = 0; q < rule.weights.size(); ++q) {
-        Point<d> x = Point<d>::Zero();
-        for (int i = 0; i < d; ++i) x += rule.barycentric(q, i) * mesh.nodes.row(facets.nodes(f, i)).transpose();
-        const std::size_t point = new_point(x, nu, area.norm() * rule.weights[q]);
-        for (int i = 0; i < d; ++i) add_shape(point, facets.nodes(f, i), rule.barycentric(q, i));
+      } else {
+        for (Eigen::Index q = 0; q < rule.weights.size(); ++q) {
+          Point<d> x = Point<d>::Zero();
+          for (int i = 0; i < d; ++i) x += rule.barycentric(q, i) * mesh.nodes.row(facets.nodes(f, i)).transpose();
+          const std::size_t point = new_point(x, nu, area.norm() * rule.weights[q]);
+          for (int i = 0; i < d; ++i) add_shape(point, facets.nodes(f, i), rule.barycentric(q, i));
+        }
       }
     }
   }
@@ -84,6 +94,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   }
   shape_.resize(count * d, nodes() * d);
   shape_.setFromTriplets(shape.begin(), shape.end());
+  scalar_shape_.resize(count, nodes());
+  scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
 }
 
 template <int d>
@@ -95,10 +107,18 @@ std::vector<PetscInt> ContactSurface<d>::unknowns(int block) const {
 }
 
 template <int d>
+std::vector<PetscInt> ContactSurface<d>::global_nodes() const {
+  std::vector<PetscInt> indices;
+  for (const Index node : nodes_) indices.push_back(layout_.global_of(node));
+  return indices;
+}
+
+template <int d>
 Eigen::VectorXd ContactSurface<d>::nodal_values(Vec v) const {
+  if (nodes_.empty()) return {};
   PetscInt begin, end;
   WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
-  const auto indices = unknowns(d);
+  const auto indices = block_size(v) == 1 ? global_nodes() : unknowns(d);
   Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(indices.size()));
   {
     Values own(v);

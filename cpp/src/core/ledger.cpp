@@ -11,7 +11,8 @@ namespace warmslip {
 namespace {
 
 double dot(Vec a, Vec b) {
-  PetscReal value;
+  PetscReal value = 0;
+  if (!a || !b) return 0;
   WARMSLIP_PETSC(VecDot(a, b, &value));
   return value;
 }
@@ -19,6 +20,7 @@ double dot(Vec a, Vec b) {
 // (a1 - a0) . (b1 - b0) without forming the differences
 template <int d>
 double dot_of_changes(const Layout<d>& layout, Vec a1, Vec a0, Vec b1, Vec b0) {
+  if (!b1) return 0;
   Values x1(a1), x0(a0), y1(b1), y0(b0);
   return layout.sum(((*x1) - (*x0)).dot((*y1) - (*y0)));
 }
@@ -39,6 +41,7 @@ double unexplained(double sum, double terms, double rounding) {
 
 // Sum of |entries| of every row that this rank owns.
 Eigen::VectorXd row_sizes(Mat a) {
+  if (!a) return {};
   PetscInt begin, end;
   WARMSLIP_PETSC(MatGetOwnershipRange(a, &begin, &end));
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(end - begin);
@@ -53,9 +56,21 @@ Eigen::VectorXd row_sizes(Mat a) {
 }
 
 double largest(Vec v) {
-  PetscReal value;
-  WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+  PetscReal value = 0;
+  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
   return value;
+}
+
+// out += factor * v, if there is such a vector
+void add(Vec out, double factor, Vec v) {
+  if (v) WARMSLIP_PETSC(VecAXPY(out, factor, v));
+}
+
+// Largest of some sizes over all nodes of all ranks.
+template <std::size_t count>
+std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> most) {
+  MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(count), MPI_DOUBLE, MPI_MAX, comm);
+  return most;
 }
 
 // Sums of nodal forces and of their moments, and of their sizes.
@@ -78,6 +93,26 @@ struct Resultant {
 
 }  // namespace
 
+void multiply(Mat a, Vec x, Vec y) {
+  if (a) WARMSLIP_PETSC(MatMult(a, x, y));
+}
+
+template <int d>
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap) {
+  ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
+  for (Eigen::Index i = 0; i < surface.points(); ++i) {
+    const ContactPart& part = problem.contacts[surface.contact(i)];
+    const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
+    const double r = u.segment<d>(i * d).dot(nu) - gap[i], speed = (velocity - velocity.dot(nu) * nu).norm(),
+                 weight = surface.weights()[i];
+    flow.conductance[i] = weight * part.heat.per_pressure * part.law->compliance.pressure(r);
+    flow.friction[i] =
+        part.heat.friction_share * friction_power(part.law->friction, weight * part.law->bound(r, speed).value, speed);
+  }
+  return flow;
+}
+
 template <int d>
 Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                           const ContactSurface<d>& surface)
@@ -85,32 +120,46 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
       problem_(problem),
       operators_(operators),
       surface_(surface),
-      viscous_w_(layout.vector(d)),
-      conducted_(layout.vector(1)),
-      exchanged_(layout.vector(1)),
-      contact_force_(layout.vector(d)),
       elastic_rows_(row_sizes(operators.elasticity)),
       viscous_rows_(row_sizes(operators.viscosity)),
       conduction_rows_(row_sizes(operators.conductivity)),
-      unknowns_(surface.unknowns(d)) {
+      unknowns_(surface.unknowns(d)),
+      nodes_(surface.global_nodes()) {
+  if (operators.viscosity) viscous_w_ = layout.vector(d);
+  if (surface.points() > 0) contact_force_ = layout.vector(d);
+  if (operators.conductivity) conducted_ = layout.vector(1);
+  if (operators.exchange) exchanged_ = layout.vector(1);
+  if (operators.conductivity && problem.contact_heats()) contact_heat_ = layout.vector(1);
   centroid_ = layout.mesh().nodes.colwise().mean().transpose();
   const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   for (PetscInt& i : unknowns_) i -= first * d;
+  for (PetscInt& i : nodes_) i -= first;
   clamped_.resize(static_cast<std::size_t>(layout.owned()));
   cooled_.resize(clamped_.size());
   for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
 }
 
+// Replicated nodal values into the entries `at`, relative to this rank's range, of a distributed vector.
+template <int d>
+void Bookkeeper<d>::place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const {
+  Values values(out);
+  for (std::size_t i = 0; i < at.size(); ++i)
+    if (at[i] >= 0 && at[i] < (*values).size()) (*values)[at[i]] = nodal[static_cast<Eigen::Index>(i)];
+}
+
 template <int d>
 Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
   Ledger ledger{};
-  WARMSLIP_PETSC(MatMult(operators_.viscosity, after.w, viscous_w_));
-  WARMSLIP_PETSC(MatMult(operators_.conductivity, after.theta, conducted_));
-  WARMSLIP_PETSC(MatMult(operators_.exchange, after.theta, exchanged_));
-  contact(before, after, in, ledger);
-  energy(before, after, in, ledger);
-  resultants(before, after, in, heat(before, after, in, ledger), ledger);
+  multiply(operators_.viscosity, after.w, viscous_w_);
+  multiply(operators_.conductivity, after.theta, conducted_);
+  multiply(operators_.exchange, after.theta, exchanged_);
+  if (surface_.points() > 0) contact(before, after, in, ledger);
+  if (after.w) {
+    forces(before, after, in, ledger);
+    energy(before, after, in, ledger);
+  }
+  if (after.theta) heat(before, after, in, ledger);
   return ledger;
 }
 
@@ -118,130 +167,102 @@ Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepI
 template <int d>
 void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const Eigen::VectorXd w_points = surface_.at_points(surface_.nodal_values(after.w));
-  const auto& law = problem_.law;
-  ContactProblem<d> problem{law, in.k, {}, in.contact_free, in.contact_scale};
+  ContactProblem<d> problem{{}, in.k, {}, in.contact_free, in.contact_scale};
+  for (const ContactPart& part : problem_.contacts) problem.laws.push_back(part.law.value_or(ContactLaw{}));
   double stored_before = 0;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
     const Point<d> u0 = before.contact_u.segment<d>(i * d), u1 = after.contact_u.segment<d>(i * d);
     const double weight = surface_.weights()[i];
     const double r1 = u1.dot(nu) - after.gap[i], r0 = u0.dot(nu) - after.gap[i], r_old = u0.dot(nu) - before.gap[i];
+    const ContactLaw& law = problem.laws[surface_.contact(i)];
     l.contact += weight * law.compliance.energy(r1);
     stored_before += weight * law.compliance.energy(r_old);
     l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
     l.contact_damping +=
         weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
-    l.friction += in.k * weight * law.bound(r1) * (w - w.dot(nu) * nu).norm();
-    problem.points.push_back({nu, weight, r0, u0, after.gap[i]});
+    const double speed = (w - w.dot(nu) * nu).norm();
+    l.friction += in.k * friction_power(law.friction, weight * law.bound(r1, speed).value, speed);
+    problem.points.push_back({nu, weight, r0, u0, after.gap[i], surface_.contact(i)});
   }
   l.contact_change = l.contact - stored_before;
   l.law_residual = law_residual(problem, in.contact_force, w_points, &l.law_floor);
+  place(unknowns_, surface_.to_nodes(in.contact_force), contact_force_);
+  if (!contact_heat_) return;
+  const ContactFlow flow = contact_flow(problem_, surface_, after.contact_u, w_points, after.gap);
+  const Eigen::VectorXd led = flow.conductance.cwiseProduct(after.contact_theta - in.foundation);
+  l.exchanged = in.k * led.dot(after.contact_theta);
+  l.friction_heating = in.k * flow.friction.dot(after.contact_theta);
+  place(nodes_, surface_.scalar_shape().transpose() * (led - flow.friction), contact_heat_);
 }
 
 // Momentum tested with k w_n.
 template <int d>
 void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
-  const double rho = problem_.material.density;
-  const double kinetic_before = 0.5 * rho * dot(before.w, before.mass_w),
+  const double kinetic_before = 0.5 * dot(before.w, before.momentum),
                elastic_before = 0.5 * dot(before.u, before.elastic_u);
-  l.kinetic = 0.5 * rho * dot(after.w, after.mass_w);
+  l.kinetic = 0.5 * dot(after.w, after.momentum);
   l.elastic = 0.5 * dot(after.u, after.elastic_u);
   l.kinetic_change = l.kinetic - kinetic_before;
   l.elastic_change = l.elastic - elastic_before;
-  l.inertia_damping = 0.5 * rho * dot_of_changes(layout_, after.w, before.w, after.mass_w, before.mass_w);
+  l.inertia_damping = 0.5 * dot_of_changes(layout_, after.w, before.w, after.momentum, before.momentum);
   l.elastic_damping = 0.5 * dot_of_changes(layout_, after.u, before.u, after.elastic_u, before.elastic_u);
   l.viscous = in.k * dot(after.w, viscous_w_);
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
   const double contact_before = l.contact - l.contact_change;
-  const std::initializer_list<double> terms{l.kinetic,   kinetic_before,   l.elastic, elastic_before,
-                                            l.contact,   contact_before,   l.viscous, l.friction,
-                                            l.load_work, l.expansion_work, l.gap_work};
+  const std::initializer_list<double> terms{l.kinetic,   kinetic_before,   l.elastic,  elastic_before,
+                                            l.contact,   contact_before,   l.viscous,  l.friction,
+                                            l.load_work, l.expansion_work, l.gap_work, l.support_work};
   // the law's pressure, with its rounding, enters four terms: stored before and after, damping, friction
   const double touching = std::max({l.contact, contact_before, l.contact_damping, l.friction, std::abs(l.gap_work)});
   l.energy_floor = touching > 0 ? 4 * l.law_floor * relative(touching, terms) : 0;
-  l.energy_residual =
-      relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
-                   l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work,
-               terms);
+  l.energy_residual = relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping +
+                                   l.elastic_damping + l.contact_damping + l.viscous + l.friction - l.load_work -
+                                   l.expansion_work - l.gap_work - l.support_work,
+                               terms);
 }
 
-// The heat balance tested with k theta_n; returns its relative residual.
+// Force and moment (v rigid), and the equation of motion at every free node: the supports' reactions are the residuals
+// of the fixed rows.
 template <int d>
-double Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
-  const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
-               stored = 0.5 * dot(after.theta, after.mass_theta);
-  l.heat_change = stored - stored_before;
-  l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
-  l.conducted = in.k * dot(after.theta, conducted_);
-  l.exchanged = in.k * dot(after.theta, exchanged_);
-  l.supplied = in.k * dot(in.heat, after.theta);
-  l.heating = in.k * dot(in.heating_w, after.theta);
-  return relative(l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating,
-                  {stored, stored_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating});
-}
-
-// Heat content (eta = 1), force and moment (v rigid), and both equations at every free node: the supports' reactions
-// are the residuals of the fixed rows.
-template <int d>
-void Bookkeeper<d>::resultants(const Level& before, const Level& after, const StepInputs& in, double heat_energy,
-                               Ledger& l) {
-  const double rho = problem_.material.density, k = in.k;
-  {
-    const Eigen::VectorXd nodal = surface_.to_nodes(in.contact_force);
-    Values out(contact_force_);
-    for (std::size_t i = 0; i < unknowns_.size(); ++i)
-      if (unknowns_[i] >= 0 && unknowns_[i] < layout_.owned() * d)
-        (*out)[unknowns_[i]] = nodal[static_cast<Eigen::Index>(i)];
-  }
+void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
-  double content = 0, content_size = 0, force_rounding = 0, moment_rounding = 0, heat_rounding = 0;
-  // largest over the nodes: what an equation leaves over, the size of its terms, the forces in it and those applied
-  enum { motion, motion_size, heat_left, heat_size, forces_here, applied, internal_size };
-  std::array<double, 7> most{};
-  const auto raise = [&](int which, double value) {
-    most[static_cast<std::size_t>(which)] = std::max(most[static_cast<std::size_t>(which)], value);
-  };
-  const double u = largest(after.u), w = largest(after.w), theta = largest(after.theta);
+  double force_rounding = 0, moment_rounding = 0;
+  // largest over the nodes: what the equation leaves over, the size of its terms, the forces in it and those applied
+  enum { motion, motion_size, forces_here, applied, internal_size };
+  std::array<double, 5> most{};
+  const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
+  const double u = largest(after.u), w = largest(after.w);
   {
-    Values m1(after.mass_w), m0(before.mass_w), f(in.force), e(after.elastic_u), b(viscous_w_), g(in.expansion_theta),
-        c(contact_force_);
-    Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_);
+    Values m1(after.momentum), m0(before.momentum), f(in.force), e(after.elastic_u), b(viscous_w_),
+        g(in.expansion_theta), c(contact_force_), velocity(after.w);
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
-      const auto node = static_cast<std::size_t>(i);
-      const Point<d> position = layout_.mesh().nodes.row(layout_.mesh_nodes()[node]).transpose() - centroid_;
-      const auto at = [&](Values& v) -> Point<d> { return (*v).template segment<d>(i * d); };
-      const Point<d> inertia = rho / k * (at(m1) - at(m0)), load = at(f), contact_here = at(c);
+      const Point<d> position =
+          layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
+      const auto at = [&](auto&& v) -> Point<d> {
+        return v.size() ? Point<d>(v.template segment<d>(i * d)) : Point<d>(Point<d>::Zero());
+      };
+      const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
+                     elastic = at(*e), viscous = at(*b), expansion = at(*g);
       force.add(position, inertia);
       force.add(position, -load);
       force.add(position, contact_here);
-      const Point<d> internal = elastic_rows_.template segment<d>(i * d) * u +
-                                viscous_rows_.template segment<d>(i * d) * w + at(g).cwiseAbs();
+      const Point<d> internal = at(elastic_rows_) * u + at(viscous_rows_) * w + expansion.cwiseAbs();
       force_rounding += internal.squaredNorm();
       moment_rounding += internal.squaredNorm() * position.squaredNorm();
-      const Point<d> left = inertia - load + contact_here + at(b) + at(e) - at(g);
-      if (clamped_[node])
+      const Point<d> left = inertia - load + contact_here + viscous + elastic - expansion;
+      if (clamped_[static_cast<std::size_t>(i)]) {
         force.add(position, -left);
-      else
-        raise(motion, left.cwiseAbs().maxCoeff());
-      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs() + at(g).cwiseAbs();
-      raise(motion_size, (rho / k * (at(m1).cwiseAbs() + at(m0).cwiseAbs()) + given + internal).maxCoeff());
-      raise(applied, given.maxCoeff());
-      raise(forces_here, (given + at(e).cwiseAbs() + at(b).cwiseAbs()).maxCoeff());
-      raise(internal_size, internal.maxCoeff());
-      const double storage = ((*t1)[i] - (*t0)[i]) / k, exchange = (*x)[i], source = (*q)[i] + (*h)[i];
-      content += storage + exchange - source;
-      content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
-      const double within = conduction_rows_[i] * theta + (std::abs((*t1)[i]) + std::abs((*t0)[i])) / k;
-      heat_rounding += within * within;
-      const double wall = storage + exchange - source + (*flux)[i];
-      if (cooled_[node]) {
-        content -= wall;
-        content_size += std::abs(wall);
+        l.support_work += in.k * left.dot(at(*velocity));
       } else {
-        raise(heat_left, std::abs(wall));
+        raise(motion, left.cwiseAbs().maxCoeff());
       }
-      raise(heat_size, within + std::abs(exchange) + std::abs((*q)[i]) + std::abs((*h)[i]));
+      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs() + expansion.cwiseAbs();
+      raise(motion_size, ((p1.cwiseAbs() + p0.cwiseAbs()) / in.k + given + internal).maxCoeff());
+      raise(applied, given.maxCoeff());
+      raise(forces_here, (given + elastic.cwiseAbs() + viscous.cwiseAbs()).maxCoeff());
+      raise(internal_size, internal.maxCoeff());
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
@@ -249,30 +270,76 @@ void Bookkeeper<d>::resultants(const Level& before, const Level& after, const St
   const double forces = sizes.head(d).maxCoeff(), moments = sizes.tail(sizes.size() - d).maxCoeff();
   force_rounding = layout_.sum(force_rounding);
   moment_rounding = layout_.sum(moment_rounding);
+  l.support_work = layout_.sum(l.support_work);
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, i < d ? unexplained(sums[i], forces, force_rounding)
                                                         : unexplained(sums[i], moments, moment_rounding));
-  const double heat = unexplained(layout_.sum(content), layout_.sum(content_size), layout_.sum(heat_rounding));
   // sums say nothing about the equations behind them: those of all free nodes hold as well, in size relative to the
   // largest
-  MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(most.size()), MPI_DOUBLE, MPI_MAX, layout_.comm());
+  most = over_ranks(layout_.comm(), most);
   l.force_residual = std::max(l.force_residual, relative(most[motion], {most[motion_size]}));
-  l.heat_residual = std::max({heat_energy, heat, relative(most[heat_left], {most[heat_size]})});
   // without any load there is nothing a strain of rounding could be mistaken for
   if (most[applied] > 0)
     l.force_floor = std::numeric_limits<double>::epsilon() * relative(most[internal_size], {most[forces_here]});
 }
 
+// The heat balance tested with k theta_n and with 1, and its equation at every free node.
+template <int d>
+void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+  const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
+               stored = 0.5 * dot(after.theta, after.mass_theta);
+  double content = 0, content_size = 0, rounding = 0;
+  enum { left_over, size };
+  std::array<double, 2> most{};
+  const double theta = largest(after.theta);
+  {
+    Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
+        c(contact_heat_), values(after.theta);
+    const auto at = [](auto&& v, PetscInt i) { return v.size() ? v[i] : 0.0; };
+    for (PetscInt i = 0; i < layout_.owned(); ++i) {
+      const double storage = ((*t1)[i] - (*t0)[i]) / in.k, supply = at(*q, i), heating = at(*h, i);
+      const double exchange = at(*x, i) + at(*c, i), source = supply + heating;
+      content += storage + exchange - source;
+      content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
+      const double within = conduction_rows_[i] * theta + (std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k;
+      rounding += within * within;
+      const double wall = storage + exchange - source + (*flux)[i];
+      if (cooled_[static_cast<std::size_t>(i)]) {
+        content -= wall;
+        content_size += std::abs(wall);
+        l.held += in.k * wall * (*values)[i];
+      } else {
+        most[left_over] = std::max(most[left_over], std::abs(wall));
+      }
+      most[size] = std::max(most[size], within + std::abs(exchange) + std::abs(supply) + std::abs(heating));
+    }
+  }
+  l.held = layout_.sum(l.held);
+  l.heat_change = stored - stored_before;
+  l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
+  l.conducted = in.k * dot(after.theta, conducted_);
+  l.exchanged += in.k * dot(after.theta, exchanged_);
+  l.supplied = in.k * dot(in.heat, after.theta);
+  l.heating = in.k * dot(in.heating_w, after.theta);
+  l.heat_residual = relative(
+      l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating - l.friction_heating - l.held,
+      {stored, stored_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating, l.friction_heating,
+       l.held});
+  most = over_ranks(layout_.comm(), most);
+  l.heat_residual =
+      std::max({l.heat_residual, unexplained(layout_.sum(content), layout_.sum(content_size), layout_.sum(rounding)),
+                relative(most[left_over], {most[size]})});
+}
+
 template <int d>
 void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
-  const double rate = problem_.material.density / in.k;
   WARMSLIP_PETSC(VecCopy(in.force, out));
-  WARMSLIP_PETSC(VecAXPY(out, 1, in.expansion_theta));
-  WARMSLIP_PETSC(VecAXPY(out, -1, viscous_w_));
-  WARMSLIP_PETSC(VecAXPY(out, -1, after.elastic_u));
-  WARMSLIP_PETSC(VecAXPY(out, -1, contact_force_));
-  Values values(out), m1(after.mass_w), m0(before.mass_w);
-  *values -= rate * (*m1 - *m0);
+  add(out, 1, in.expansion_theta);
+  add(out, -1, viscous_w_);
+  add(out, -1, after.elastic_u);
+  add(out, -1, contact_force_);
+  Values values(out), m1(after.momentum), m0(before.momentum);
+  if (after.momentum) *values -= (*m1 - *m0) / in.k;
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     if (clamped_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
 }
@@ -280,16 +347,21 @@ void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, con
 template <int d>
 void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
   WARMSLIP_PETSC(VecCopy(in.heat, out));
-  WARMSLIP_PETSC(VecAXPY(out, 1, in.heating_w));
-  WARMSLIP_PETSC(VecAXPY(out, -1, conducted_));
-  WARMSLIP_PETSC(VecAXPY(out, -1, exchanged_));
+  add(out, 1, in.heating_w);
+  add(out, -1, conducted_);
+  add(out, -1, exchanged_);
+  add(out, -1, contact_heat_);
   Values values(out), m1(after.mass_theta), m0(before.mass_theta);
   *values -= (*m1 - *m0) / in.k;
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+#define WARMSLIP_INSTANTIATE(d)                                                                             \
+  template class Bookkeeper<d>;                                                                             \
+  template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&, \
+                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
+WARMSLIP_INSTANTIATE(2)
+WARMSLIP_INSTANTIATE(3)
 
 }  // namespace warmslip

@@ -1,5 +1,6 @@
 #include "warmslip/operators.hpp"
 
+#include <algorithm>
 #include <set>
 
 #include "warmslip/element.hpp"
@@ -10,12 +11,13 @@ namespace {
 template <int rows, int cols>
 using RowMajor = Eigen::Matrix<double, rows, cols, Eigen::RowMajor>;
 
-// a = sum over the rank's cells of kernel(simplex)
+// a = sum over the rank's cells of kernel(simplex, material)
 template <int d, class Kernel>
-MatHandle assemble(const Layout<d>& layout, int rows, int cols, Kernel&& kernel) {
+MatHandle assemble(const Layout<d>& layout, const Problem<d>& problem, int rows, int cols, Kernel&& kernel) {
   MatHandle a = layout.matrix(rows, cols);
   for (Eigen::Index c = 0; c < layout.cells(); ++c) {
-    const auto block = kernel(simplex<d>(vertices(layout.mesh(), layout.mesh_cells()[static_cast<std::size_t>(c)])));
+    const Index cell = layout.mesh_cells()[static_cast<std::size_t>(c)];
+    const auto block = kernel(simplex<d>(vertices(layout.mesh(), cell)), problem.material(cell));
     using Block = std::decay_t<decltype(block)>;
     const RowMajor<Block::RowsAtCompileTime, Block::ColsAtCompileTime> values = block;
     layout.add(a, c, values.data());
@@ -24,20 +26,36 @@ MatHandle assemble(const Layout<d>& layout, int rows, int cols, Kernel&& kernel)
   return a;
 }
 
-// int k_c theta eta over the facets of Gamma_C
+template <class Tensor>
+Tensor or_zero(const std::optional<Tensor>& tensor) {
+  return tensor ? *tensor : Tensor(Tensor::Zero());
+}
+
+// rho M / k + B + k A on one cell
 template <int d>
-MatHandle exchange_matrix(const Layout<d>& layout, const Problem<d>& problem) {
-  MatHandle a = layout.matrix(1, 1);
-  const Facets<d>& facets = layout.mesh().part(problem.contact_part);
-  for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
-    if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
-    const RowMajor<d, d> block = problem.conductance * mass<d>(area_normal(layout.mesh(), facets, f).norm());
-    std::array<PetscInt, d> nodes;
-    for (int i = 0; i < d; ++i) nodes[static_cast<std::size_t>(i)] = layout.global_of(facets.nodes(f, i));
-    WARMSLIP_PETSC(MatSetValuesBlocked(a, d, nodes.data(), d, nodes.data(), block.data(), ADD_VALUES));
+VectorBlock<d> momentum(const Simplex<d>& s, const Material<d>& m, double k) {
+  VectorBlock<d> block = VectorBlock<d>::Zero();
+  if (m.density > 0) block += m.density / k * warmslip::vector_mass<d>(s);
+  if (m.elasticity || m.viscosity) block += strain_energy<d>(s, or_zero(m.viscosity) + k * or_zero(m.elasticity));
+  return block;
+}
+
+// Adds factor * int k_c theta eta over the facets of Gamma_C, in component `component` of `block` unknowns a node.
+template <int d>
+void add_exchange(const Layout<d>& layout, const Problem<d>& problem, double factor, int block, int component, Mat a) {
+  for (const ContactPart& contact : problem.contacts) {
+    if (contact.conductance == 0) continue;
+    const Facets<d>& facets = layout.mesh().part(contact.part);
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+      if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
+      const RowMajor<d, d> values =
+          factor * contact.conductance * mass<d>(area_normal(layout.mesh(), facets, f).norm());
+      std::array<PetscInt, d> unknowns;
+      for (int i = 0; i < d; ++i)
+        unknowns[static_cast<std::size_t>(i)] = layout.global_of(facets.nodes(f, i)) * block + component;
+      WARMSLIP_PETSC(MatSetValues(a, d, unknowns.data(), d, unknowns.data(), values.data(), ADD_VALUES));
+    }
   }
-  layout.assemble(a);
-  return a;
 }
 
 // Owned global scalar indices of the nodes of `parts`, `block` unknowns a node.
@@ -66,25 +84,45 @@ void fix(Mat a, const std::vector<PetscInt>& indices) {
 
 template <int d>
 Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
-  const Material<d>& m = problem.material;
-  mass = assemble(layout, 1, 1, [](const Simplex<d>& s) { return warmslip::mass<d + 1>(s.volume); });
-  WARMSLIP_PETSC(MatCreateMAIJ(mass, d, vector_mass.out()));
-  elasticity = assemble(layout, d, d, [&](const Simplex<d>& s) { return strain_energy<d>(s, m.elasticity); });
-  viscosity = assemble(layout, d, d, [&](const Simplex<d>& s) { return strain_energy<d>(s, m.viscosity); });
-  conductivity = assemble(layout, 1, 1, [&](const Simplex<d>& s) { return conduction<d>(s, m.conductivity); });
-  expansion = assemble(layout, d, 1, [&](const Simplex<d>& s) { return coupling<d>(s, m.expansion); });
-  heating = assemble(layout, 1, d, [&](const Simplex<d>& s) { return coupling<d>(s, m.heating).transpose().eval(); });
-  exchange = exchange_matrix(layout, problem);
-  clamped = fixed(layout, problem.clamped, d);
+  using M = Material<d>;
+  using S = Simplex<d>;
+  const auto has = [&](auto block) { return problem.has(block); };
+  if (problem.inertial()) {
+    const MatHandle scalar = assemble(layout, problem, 1, 1, [](const S& s, const M& m) {
+      return (m.density * warmslip::mass<d + 1>(s.volume)).eval();
+    });
+    WARMSLIP_PETSC(MatCreateMAIJ(scalar, d, inertia.out()));
+  }
+  if (has(&M::elasticity))
+    elasticity = assemble(layout, problem, d, d,
+                          [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.elasticity)); });
+  if (has(&M::viscosity))
+    viscosity = assemble(layout, problem, d, d,
+                         [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.viscosity)); });
+  if (problem.moves()) clamped = fixed(layout, problem.clamped, d);
+  if (!problem.conducts()) return;
+  mass = assemble(layout, problem, 1, 1,
+                  [](const S& s, const M& m) { return (m.capacity * warmslip::mass<d + 1>(s.volume)).eval(); });
+  conductivity =
+      assemble(layout, problem, 1, 1, [](const S& s, const M& m) { return conduction<d>(s, or_zero(m.conductivity)); });
+  if (has(&M::expansion))
+    expansion =
+        assemble(layout, problem, d, 1, [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.expansion)); });
+  if (has(&M::heating))
+    heating = assemble(layout, problem, 1, d,
+                       [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.heating)).transpose().eval(); });
+  if (std::any_of(problem.contacts.begin(), problem.contacts.end(), [](auto& c) { return c.conductance != 0; })) {
+    exchange = layout.matrix(1, 1);
+    add_exchange(layout, problem, 1, 1, 0, exchange);
+    layout.assemble(exchange);
+  }
   cooled = fixed(layout, problem.cooled, 1);
 }
 
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k) {
-  const Material<d>& m = problem.material;
-  MatHandle a = assemble(layout, d, d, [&](const Simplex<d>& s) -> VectorBlock<d> {
-    return (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
-  });
+  MatHandle a =
+      assemble(layout, problem, d, d, [k](const Simplex<d>& s, const Material<d>& m) { return momentum<d>(s, m, k); });
   fix(a, operators.clamped);
   return a;
 }
@@ -95,7 +133,7 @@ MatHandle heat_matrix(const Operators<d>& operators, double k) {
   WARMSLIP_PETSC(MatDuplicate(operators.mass, MAT_COPY_VALUES, a.out()));
   WARMSLIP_PETSC(MatScale(a, 1 / k));
   WARMSLIP_PETSC(MatAXPY(a, 1, operators.conductivity, SAME_NONZERO_PATTERN));
-  WARMSLIP_PETSC(MatAXPY(a, 1, operators.exchange, SUBSET_NONZERO_PATTERN));
+  if (operators.exchange) WARMSLIP_PETSC(MatAXPY(a, 1, operators.exchange, SUBSET_NONZERO_PATTERN));
   fix(a, operators.cooled);
   return a;
 }
@@ -103,31 +141,22 @@ MatHandle heat_matrix(const Operators<d>& operators, double k) {
 template <int d>
 MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k,
                          double scale) {
-  const Material<d>& m = problem.material;
   constexpr int b = d + 1;
-  MatHandle a = assemble(layout, b, b, [&](const Simplex<d>& s) {
-    const VectorBlock<d> momentum =
-        (m.density / k * warmslip::vector_mass<d>(s) + strain_energy<d>(s, m.viscosity + k * m.elasticity)).eval();
-    const MixedBlock<d> expansion = coupling<d>(s, m.expansion), heating = coupling<d>(s, m.heating);
-    const ScalarBlock<d> heat = mass<d + 1>(s.volume) / k + conduction<d>(s, m.conductivity);
+  MatHandle a = assemble(layout, problem, b, b, [&](const Simplex<d>& s, const Material<d>& m) {
+    const VectorBlock<d> motion = momentum<d>(s, m, k);
+    const MixedBlock<d> expansion = coupling<d>(s, or_zero(m.expansion)), heating = coupling<d>(s, or_zero(m.heating));
+    const ScalarBlock<d> heat = m.capacity / k * mass<d + 1>(s.volume) + conduction<d>(s, or_zero(m.conductivity));
     Eigen::Matrix<double, b*(d + 1), b*(d + 1)> block;
     for (int i = 0; i <= d; ++i)
       for (int j = 0; j <= d; ++j) {
-        block.template block<d, d>(i * b, j * b) = momentum.template block<d, d>(i * d, j * d);
+        block.template block<d, d>(i * b, j * b) = motion.template block<d, d>(i * d, j * d);
         block.template block<d, 1>(i * b, j * b + d) = -expansion.template block<d, 1>(i * d, j);
         block.template block<1, d>(i * b + d, j * b) = -scale * heating.template block<d, 1>(j * d, i).transpose();
         block(i * b + d, j * b + d) = scale * heat(i, j);
       }
     return block;
   });
-  const Facets<d>& facets = layout.mesh().part(problem.contact_part);
-  for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
-    if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
-    const RowMajor<d, d> exchange = scale * problem.conductance * mass<d>(area_normal(layout.mesh(), facets, f).norm());
-    std::array<PetscInt, d> unknowns;
-    for (int i = 0; i < d; ++i) unknowns[static_cast<std::size_t>(i)] = layout.global_of(facets.nodes(f, i)) * b + d;
-    WARMSLIP_PETSC(MatSetValues(a, d, unknowns.data(), d, unknowns.data(), exchange.data(), ADD_VALUES));
-  }
+  add_exchange(layout, problem, scale, b, d, a);
   layout.assemble(a);
   std::vector<PetscInt> indices;
   for (const PetscInt i : operators.clamped) indices.push_back(i / d * b + i % d);

@@ -23,10 +23,13 @@ Eigen::Index block_size(Vec v) {
 }
 
 Values::Values(Vec vec) : vec_(vec) {
+  if (!vec) return;
   WARMSLIP_PETSC(VecGetLocalSize(vec, &size_));
   WARMSLIP_PETSC(VecGetArray(vec, &data_));
 }
 
-Values::~Values() { VecRestoreArray(vec_, &data_); }
+Values::~Values() {
+  if (vec_) VecRestoreArray(vec_, &data_);
+}
 
 }  // namespace warmslip

@@ -1,32 +1,43 @@
 #include "warmslip/contact_solver.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <stdexcept>
 
 namespace warmslip {
+namespace {
+
+// Whether statuses alone make the tangent.
+template <int d>
+bool by_status(const ContactProblem<d>& problem) {
+  return d == 2 && std::all_of(problem.laws.begin(), problem.laws.end(),
+                               [](const ContactLaw& law) { return law.piecewise_linear(); });
+}
+
+}  // namespace
 
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
                     double* floor) {
   constexpr double eps = std::numeric_limits<double>::epsilon();
-  const double mu = problem.law.friction.coefficient;
-  double largest = 0, fastest = 0, rounding = 0;
+  double largest = 0, fastest = 0, rounding = 0, widest = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
+    const ContactLaw& law = problem.law(i);
     const auto at = static_cast<Eigen::Index>(i) * d;
-    const double r = point.penetration + problem.step * velocity.template segment<d>(at).dot(point.normal);
-    largest =
-        std::max({largest, force.template segment<d>(at).norm(), point.weight * problem.law.compliance.pressure(r)});
-    fastest = std::max({fastest, problem.free.template segment<d>(at).norm(), velocity.template segment<d>(at).norm()});
+    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
+                   free = problem.free.template segment<d>(at);
+    const double r = point.penetration + problem.step * w.dot(point.normal);
+    largest = std::max({largest, f.norm(), point.weight * law.compliance.pressure(r)});
+    widest = std::max(widest, point.weight * law.bound(r, (w - w.dot(point.normal) * point.normal).norm()).value);
+    fastest = std::max({fastest, free.norm(), w.norm()});
     // the velocity is what the contact force leaves of the free one
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
-    const double terms =
-        along(point.displacement) + std::abs(point.gap) +
-        problem.step * (along(velocity.template segment<d>(at)) + along(problem.free.template segment<d>(at)));
+    const double terms = along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free));
     const double blur =
         4 * eps * terms;  // what rounding makes of r; a point that is open all the same has no part in it
-    if (r > -blur) rounding = std::max(rounding, point.weight * problem.law.compliance.stiffness * blur);
+    if (r > -blur) rounding = std::max(rounding, point.weight * law.compliance.tangent(std::max(r, 0.0) + blur) * blur);
   }
   *floor = std::numeric_limits<double>::infinity();
   if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))
@@ -36,19 +47,19 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     return 0;
   }
   *floor = rounding / largest;
-  const double bound_scale = mu > 0 ? mu * largest : largest;
+  const double bound_scale = widest > 0 ? widest : largest;
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
+    const ContactLaw& law = problem.law(i);
     const auto at = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
     const double r = point.penetration + problem.step * w.dot(point.normal);
     const Point<d> f_tau = f - f.dot(point.normal) * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
-    const double bound = point.weight * problem.law.bound(r);
-    worst =
-        std::max({worst, std::abs(f.dot(point.normal) - point.weight * problem.law.compliance.pressure(r)) / largest,
-                  (f_tau.norm() - bound) / bound_scale,
-                  fastest > 0 ? (bound * w_tau.norm() - f_tau.dot(w_tau)) / (bound_scale * fastest) : 0.0});
+    const double bound = point.weight * law.bound(r, w_tau.norm()).value;
+    const FrictionDefect defect = friction_defect<d>(law.friction, bound, f_tau, w_tau);
+    worst = std::max({worst, std::abs(f.dot(point.normal) - point.weight * law.compliance.pressure(r)) / largest,
+                      defect.force / bound_scale, fastest > 0 ? defect.power / (bound_scale * fastest) : 0.0});
   }
   return worst;
 }
@@ -76,28 +87,31 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
   at.velocity = problem.free;
   at.velocity.noalias() -= compliance_ * force;
   at.value.resize(force.size());
-  const double stiffness = problem.law.compliance.stiffness;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const ContactPoint<d>& point = problem.points[i];
+    const ContactLaw& law = problem.law(i);
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Tensor2<d> own = compliance_.template block<d, d>(row, row);
-    const Point<d>& nu = problem.points[i].normal;
+    const Point<d>& nu = point.normal;
     const double normal = nu.dot(own * nu);
     // rows in units of force, of order one in the force whatever the stiffness
-    const double alpha = 1 / (1 + problem.points[i].weight * stiffness * problem.step * normal);
+    const double stiffness =
+        law.compliance.scale(point.penetration + problem.step * problem.free.template segment<d>(row).dot(nu));
+    const double alpha = 1 / (1 + point.weight * stiffness * problem.step * normal);
     // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more
     // often
     const double beta = 1 / std::max(reach_.template segment<d>(row).maxCoeff(), 1e-300);
-    at.points.push_back(residual<d>(problem.law, problem.points[i], problem.step, alpha, beta,
-                                    force.template segment<d>(row), at.velocity.template segment<d>(row)));
+    at.points.push_back(residual<d>(law, point, problem.step, alpha, beta, force.template segment<d>(row),
+                                    at.velocity.template segment<d>(row)));
     at.value.template segment<d>(row) = at.points.back().value;
-    at.key.push_back(static_cast<int>(at.points.back().status) * 10 + at.points.back().slip_sign);
+    at.key.push_back(at.points.back().key());
   }
   return at;
 }
 
 template <int d>
 void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
-  if (d == 2 && at.key == factored_) return;  // piecewise linear laws: same statuses, same tangent
+  if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
   closed_.clear();
   for (std::size_t i = 0; i < at.points.size(); ++i)
     if (at.points[i].status != Status::open)
@@ -154,7 +168,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     if (accept(problem, solution)) break;
     if (step == options_.newton_steps) return false;
     // the same statuses once more, after others: an undamped iteration would cycle for ever
-    if (d == 2 && !line_search && at.key != factored_ && !seen.insert(at.key).second) return false;
+    if (by_status(problem) && !line_search && at.key != factored_ && !seen.insert(at.key).second) return false;
     factor(problem, at, solution);
     const Eigen::VectorXd change = direction(at, solution.force);
     if (!change.allFinite()) return false;
@@ -179,15 +193,29 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
 // gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
 template <int d>
 bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
-  const double rate = 1 / spectral_, k = problem.step, stiffness = problem.law.compliance.stiffness;
+  for (const ContactLaw& law : problem.laws)  // smooth: no threshold to freeze
+    if (law.friction.regularisation > 0) return false;
+  const double rate = 1 / spectral_, k = problem.step;
+  // lambda = weight p_nu(r) with r = penetration + k (z - lambda) / rate: falls on the right, rises on the left
+  const auto normal_force = [&](const ContactPoint<d>& point, const NormalCompliance& law, double z) {
+    if (law.linear()) {
+      const double spring = point.weight * law.stiffness * k;
+      return spring > 0 ? std::max(0.0, (z + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
+    }
+    double low = 0, high = point.weight * law.pressure(point.penetration + k * z / rate);
+    for (int i = 0; i < 60 && low < high; ++i) {
+      const double middle = 0.5 * (low + high);
+      (point.weight * law.pressure(point.penetration + k * (z - middle) / rate) > middle ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  };
   const auto prox = [&](const Eigen::VectorXd& z, const Eigen::VectorXd& bounds) {
     Eigen::VectorXd out(z.size());
     for (std::size_t i = 0; i < problem.points.size(); ++i) {
       const auto& point = problem.points[i];
       const auto row = static_cast<Eigen::Index>(i) * d;
       const double zn = z.template segment<d>(row).dot(point.normal);
-      const double spring = point.weight * stiffness * k;
-      const double normal = spring > 0 ? std::max(0.0, (zn + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
+      const double normal = normal_force(point, problem.law(i).compliance, zn);
       Point<d> tangential = z.template segment<d>(row) - zn * point.normal;
       const double bound = bounds[static_cast<Eigen::Index>(i)];
       if (tangential.norm() > bound) tangential *= bound / tangential.norm();
@@ -196,13 +224,20 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     return out;
   };
   Eigen::VectorXd force = solution.force, momentum = force, bounds(static_cast<Eigen::Index>(problem.points.size()));
+  Eigen::VectorXd velocity = problem.free;
+  const auto threshold = [&](std::size_t i) {
+    const auto& point = problem.points[i];
+    const auto row = static_cast<Eigen::Index>(i) * d;
+    const Point<d> w = velocity.template segment<d>(row);
+    const double pressure = std::max(0.0, force.template segment<d>(row).dot(point.normal)) / point.weight;
+    return point.weight *
+           problem.law(i).friction.bound(pressure, (w - w.dot(point.normal) * point.normal).norm()).value;
+  };
   double inertia = 1;
   for (int step = 0; step < options_.fixed_point_steps; ++step) {
     if (step % 20 == 0) {
-      for (std::size_t i = 0; i < problem.points.size(); ++i)
-        bounds[static_cast<Eigen::Index>(i)] =
-            problem.law.friction.coefficient *
-            std::max(0.0, force.template segment<d>(static_cast<Eigen::Index>(i) * d).dot(problem.points[i].normal));
+      velocity = problem.free - compliance_ * force;
+      for (std::size_t i = 0; i < problem.points.size(); ++i) bounds[static_cast<Eigen::Index>(i)] = threshold(i);
       momentum = force;
       inertia = 1;
     }
@@ -222,8 +257,10 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
 template <int d>
 bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   const auto count = problem.points.size();
-  if (d != 2 || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
-  const double k = problem.step, stiffness = problem.law.compliance.stiffness;
+  if (!by_status(problem) || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
+  for (const ContactLaw& law : problem.laws)  // a bound that is there without pressure has more statuses
+    if (law.friction.cohesion > 0) return false;
+  const double k = problem.step;
   for (std::size_t code = 0, codes = std::size_t{1} << (2 * count); code < codes; ++code) {
     Eigen::MatrixXd by_force = Eigen::MatrixXd::Zero(compliance_.rows(), compliance_.cols()), by_velocity = by_force;
     Eigen::VectorXd right = Eigen::VectorXd::Zero(compliance_.rows());
@@ -232,8 +269,9 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
       const auto& point = problem.points[i];
       const Eigen::Vector2d nu = point.normal.template head<2>(), tau(-nu[1], nu[0]);
       const auto choice = code >> (2 * i) & 3;  // 0 open, 1 stick, 2 and 3 slip
-      const double spring = choice == 0 ? 0 : point.weight * stiffness;
-      const double drag = choice < 2 ? 0 : (choice == 2 ? 1 : -1) * problem.law.friction.coefficient * spring;
+      const ContactLaw& law = problem.law(i);
+      const double spring = choice == 0 ? 0 : point.weight * law.compliance.stiffness;
+      const double drag = choice < 2 ? 0 : (choice == 2 ? 1 : -1) * law.friction.coefficient * spring;
       by_force.block<1, 2>(row, row) = nu.transpose();
       by_velocity.block<1, 2>(row, row) = -spring * k * nu.transpose();
       right[row] = spring * point.penetration;

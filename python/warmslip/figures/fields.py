@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from warmslip.figures.style import GREY, INK, PALE, SKY, VERMILLION, number
-from warmslip.scene import Scene, build
+from warmslip.scene import FullScene, build_full
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))
@@ -26,7 +26,7 @@ STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))
 class Final:
     """The last state of a run: nodes (n, 2), cells (m, 3), u (n, 2), theta (n,), contact points and their status."""
 
-    scene: Scene
+    scene: FullScene
     time: float
     nodes: Array
     cells: Any
@@ -52,7 +52,7 @@ def final(path: Path) -> Final:
         if file["mesh/nodes"].shape[1] != 2:
             raise ValueError("a body in space cannot be drawn here: open its final.vtu in ParaView")
         return Final(
-            scene=build({k: v for k, v in json.loads(file.attrs["scene"]).items() if v is not None}),
+            scene=build_full({k: v for k, v in json.loads(file.attrs["scene"]).items() if v is not None}),
             time=float(file["states/time"][-1]),
             nodes=file["mesh/nodes"][:],
             cells=file["mesh/cells"][:],

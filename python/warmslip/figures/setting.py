@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from warmslip.figures.fields import final
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, PALE, VERMILLION
-from warmslip.scene import Scene, load
+from warmslip.scene import FullScene, load
 
 # a part of the square: its start, its direction
 SIDES = {"left": ((0, 0), (0, 1)), "right": ((1, 0), (0, 1)), "bottom": ((0, 0), (1, 0)), "top": ((0, 1), (1, 0))}
@@ -22,7 +22,7 @@ SCALE = 0.18  # length of an arrow a unit of load
 
 def setting(inputs: list[Path]) -> tuple[Figure, str]:
     """The body of the first input's scene; the foundation temperatures of all. Inputs are scenes or trajectories."""
-    scenes = [load(path) if path.suffix == ".toml" else final(path).scene for path in inputs]
+    scenes = [load(path).full() if path.suffix == ".toml" else final(path).scene for path in inputs]
     scene = scenes[0]
     if scene.mesh.shape != "square":
         raise ValueError(f"the setting is drawn for a square; this scene has a {scene.mesh.shape}")
@@ -92,7 +92,7 @@ def body_force(ax: Any, vector: Any) -> None:
     ax.text(0.53, 0.5, rf"$f_0 = ({vector[0]:g}, {vector[1]:g})$", va="center", fontsize=8.8)
 
 
-def data(scene: Scene) -> list[str]:
+def data(scene: FullScene) -> list[str]:
     """The data, a line each."""
     e, v, c, heat = scene.elasticity, scene.viscosity, scene.contact, scene.heat
     lame, viscous = e.pair(2), v.pair(2)
@@ -124,7 +124,7 @@ def power(value: float) -> str:
     return f"10^{{{exponent}}}" if value == 10.0**exponent and exponent > 2 else f"{value:g}"
 
 
-def caption(scene: Scene, temperatures: list[float]) -> str:
+def caption(scene: FullScene, temperatures: list[float]) -> str:
     c = scene.contact
     loads = "; ".join(
         f"({', '.join(f'{v:g}' for v in vector)}) on the {part}" for part, vector in scene.loads.traction.items()

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from mpi4py import MPI
 
 from warmslip.problem import Discretisation, discretise
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify.audit_coupling import coupling
 from warmslip.verify.audit_friction import friction
 from warmslip.verify.audit_hypotheses import hypotheses
@@ -22,7 +22,7 @@ TOPICS = (hypotheses, coupling, friction, start)
 REGULAR = 1.0  # the exponent from which on a corner does not slow P1 elements
 
 
-def audit(scene: Scene) -> list[Finding]:
+def audit(scene: FullScene) -> list[Finding]:
     """All findings on a scene; raises ValueError for a scene that cannot be discretised."""
     return examine(discretise(scene, comm=MPI.COMM_SELF))
 

@@ -34,7 +34,7 @@ def trace_constants(d: Discretisation) -> tuple[float, float]:
     Infinite where no part holds the field: a rigid motion, or a constant, has a trace and no norm.
     """
     # the same assembly with unit tensors gives the norms themselves
-    unit = d.scene.override(
+    unit = d.full.override(
         elasticity={"lame": [0.0, 0.5]},
         **{"heat.conductivity": np.eye(d.dim).tolist(), "contact.heat_exchange.conductance": 1.0},
     )
@@ -48,7 +48,9 @@ def trace_constants(d: Discretisation) -> tuple[float, float]:
 def decay_rate(d: Discretisation) -> float:
     """lambda_1, one over time: d(theta, theta) + int k_c theta^2 >= lambda_1 |theta|_L2^2 on Q^h, the slowest decay of heat."""
     forms = d.operators
-    flow, mass = sparse(forms.conductivity) + sparse(forms.exchange), sparse(forms.mass)
+    flow, mass = sparse(forms.conductivity), sparse(forms.mass)
+    if forms.exchange is not None:
+        flow = flow + sparse(forms.exchange)
     free = _free(flow.shape[0], forms.cooled)
     flow, mass = flow[free][:, free], mass[free][:, free]
     if len(free) == 0:

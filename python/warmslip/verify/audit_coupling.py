@@ -124,7 +124,7 @@ def coupling(d: Discretisation) -> Iterator[Finding]:
     material = d.problem.material
     a, f = np.asarray(material.viscosity), np.asarray(material.elasticity)
     m, r = (mandel_vector(np.asarray(t)) for t in (material.expansion, material.heating))
-    c, rate, k = ratio(m, r), decay_rate(d), d.scene.step
+    c, rate, k = ratio(m, r), decay_rate(d), d.full.step
     yield _sign(c, m, r)
     yield _adiabatic(adiabatic_stiffness(f, m, r), bounds(f)[1])
     power = coupling_rate(a, m, r)
@@ -137,7 +137,7 @@ def coupling(d: Discretisation) -> Iterator[Finding]:
         if power <= rate
         else "Nothing proves that the energy stays bounded without loads; compare the ledger's expansion work and heating.",
     )
-    yield _step(d.scene.time.coupling, a, f, m, r, rate, k)
+    yield _step(d.full.time.coupling, a, f, m, r, rate, k)
 
 
 def _sign(c: float, m: Array, r: Array) -> Finding:

@@ -104,7 +104,7 @@ def step_compliance(d: Discretisation, k: float) -> Array:
 def _interpolation(d: Discretisation, nodes: Array) -> Array:
     """P1 values at the contact points from those at `nodes`, mesh numbers: (points, nodes); other nodes are held."""
     x, points = np.asarray(d.mesh.nodes), np.asarray(d.surface.positions)
-    facets = np.asarray(d.mesh.parts[d.scene.contact.part])
+    facets = np.asarray(d.mesh.parts[d.full.contact.part])
     near = min(NEAR, len(facets))
     _, candidates = cKDTree(x[facets].mean(axis=1)).query(points, k=near)
     candidates = candidates.reshape(len(points), near)
@@ -123,7 +123,7 @@ def _interpolation(d: Discretisation, nodes: Array) -> Array:
 
 def friction(d: Discretisation) -> Iterator[Finding]:
     """Whether the scene's steps have one answer."""
-    scene, material = d.scene, d.problem.material
+    scene, material = d.full, d.problem.material
     mu, stiffness, k = scene.contact.friction.coefficient, scene.contact.stiffness, scene.step
     topic, statement = "friction, one answer a step", "the friction coefficient is below the bound proved sufficient"
     if mu == 0 or stiffness == 0:

@@ -79,7 +79,7 @@ def _bounded(name: str, what: str, constant: str, tensor: Array) -> Finding:
 
 
 def _data(d: Discretisation) -> Finding:
-    times = np.linspace(0.0, d.scene.time.end, SAMPLES)
+    times = np.linspace(0.0, d.full.time.end, SAMPLES)
     x = np.asarray(d.surface.positions)
     least = min(float(evaluate(d.loads.gap, x, t, 1).min()) for t in times)
     meaning = (
@@ -98,7 +98,7 @@ def _data(d: Discretisation) -> Finding:
 
 
 def _law(d: Discretisation) -> Finding:
-    contact = d.scene.contact
+    contact = d.full.contact
     normal, tangential = contact.stiffness, contact.stiffness * contact.friction.coefficient
     return Finding(
         "(H7)",
@@ -117,7 +117,7 @@ def _smallness(d: Discretisation, m_q: float) -> Iterator[Finding]:
     integrals of the velocities, which Gronwall's inequality absorbs (and m_b, a viscosity, cannot be compared with
     (L_nu + L_tau) c_1^2, a stress, without a time); and k_c theta is monotone, so (k_c theta, theta) has the good sign.
     """
-    contact = d.scene.contact
+    contact = d.full.contact
     m_b = bounds(np.asarray(d.problem.material.viscosity))[0]
     c_1, c_3 = trace_constants(d)
     lipschitz, k_c = contact.stiffness * (1 + contact.friction.coefficient), contact.heat_exchange.conductance

@@ -20,7 +20,7 @@ from warmslip import _core
 from warmslip.problem import discretise
 from warmslip.rates import entitled, observed
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.study import study
 from warmslip.verify.audit import examine
 from warmslip.verify.audit_coupling import mandel_vector
@@ -39,14 +39,14 @@ def energy(job: Run, g: float) -> float:
     d, s = job.discretisation, job.stepper
     normals = np.asarray(d.surface.normals)
     displacement = np.asarray(s.contact_displacement).reshape(normals.shape)
-    penetration = np.maximum(np.sum(displacement * normals, axis=1) - d.scene.contact.gap, 0)
-    contact = d.scene.contact.stiffness * float(np.asarray(d.surface.weights) @ penetration**2)
-    kinetic = d.scene.inertia.density * d.norms.l2(s.w) ** 2
+    penetration = np.maximum(np.sum(displacement * normals, axis=1) - d.full.contact.gap, 0)
+    contact = d.full.contact.stiffness * float(np.asarray(d.surface.weights) @ penetration**2)
+    kinetic = d.full.inertia.density * d.norms.l2(s.w) ** 2
     elastic = float(s.u.dot(d.operators.elasticity * s.u))
     return float(kinetic + elastic + contact + g * d.norms.l2(s.theta) ** 2) / 2
 
 
-def heat_weight(scene: Scene) -> float:
+def heat_weight(scene: FullScene) -> float:
     """g = |M|/|R| in the metric of the inverse viscosity: how the audit weighs heat against motion."""
     material = discretise(scene).problem.material
     a = np.asarray(material.viscosity)
@@ -54,7 +54,7 @@ def heat_weight(scene: Scene) -> float:
     return float(np.sqrt((m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
 
 
-def growth(scene: Scene) -> float:
+def growth(scene: FullScene) -> float:
     """The largest growth of the energy in a step over its start, when a warm moving body is left to itself."""
     free = scene.override(
         **{"contact.heat_exchange.foundation_temperature": 0.0, "heat.source": 0.0, "loads": {"body": [0.0, 0.0]}},
@@ -67,7 +67,7 @@ def growth(scene: Scene) -> float:
     return float(np.diff(energies).max() / energies[0])
 
 
-def other_answer(scene: Scene) -> float:
+def other_answer(scene: FullScene) -> float:
     """The largest change of a step's velocity, over its size, when contact is solved by projected gradients alone, from the
     forces of another problem: loads four times as large, turned round."""
     d, options = discretise(scene), _core.ContactOptions()
@@ -79,7 +79,7 @@ def other_answer(scene: Scene) -> float:
     job, worst = Run(scene, discretisation=d), 0.0
     before = [d.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")]
     for n, _ in enumerate(job.steps(), 1):
-        force, heat, gap = d.load_vectors.at(n * scene.step)
+        force, heat, gap, *_ = d.load_vectors.at(n * scene.step)
         away = force.copy()
         away.scale(-4.0)
         for load, wanted in ((away, None), (force, _core.Stage.fixed_point)):  # forces are kept from one to the other
@@ -93,7 +93,7 @@ def other_answer(scene: Scene) -> float:
     return worst
 
 
-def orders(scene: Scene, levels: tuple[int, int] = LEVELS) -> dict[str, float]:
+def orders(scene: FullScene, levels: tuple[int, int] = LEVELS) -> dict[str, float]:
     """The order of each term between successive grids h = k = 1/n, each measured against its double."""
     coarse, fine = (study(scene, levels=[n], reference=2 * n)[0] for n in levels)
     return {term: observed(coarse[f"e_{term}"], fine[f"e_{term}"]) for term in TERMS}
@@ -102,7 +102,7 @@ def orders(scene: Scene, levels: tuple[int, int] = LEVELS) -> dict[str, float]:
 def lines(reading: str, levels: tuple[int, int] = LEVELS) -> Iterator[Line]:
     """What the audit claims of one reading, and the runs that could contradict it."""
     values = {"mesh.n": 8, "time.steps": 8, "contact.heat_exchange.foundation_temperature": 10.0}
-    scene = warmslip.load(f"paper_{reading}").override(**values)
+    scene = warmslip.load(f"paper_{reading}").full().override(**values)
     found = examine(discretise(scene))
     for topic in ("coupling, energy", "coupling, staggered step", "friction, one answer a step"):
         claimed = float(find(found, topic).holds == "yes")

@@ -24,7 +24,7 @@ FIT = 1e-12  # mismatch that is round-off, relative
 
 def start(d: Discretisation) -> Iterator[Finding]:
     """What of the initial data fits: temperature on held parts and on the rest, displacement, velocity, tractions."""
-    scene = d.scene
+    scene = d.full
     held_u, held_theta = scene.supports.displacement, scene.supports.temperature
     theta, k_c = scene.initial.temperature, scene.contact.heat_exchange.conductance
     spreads = float(np.linalg.eigvalsh(d.problem.material.conductivity)[-1]) > 0
@@ -77,7 +77,7 @@ def _displacement(miss: float) -> Finding:
 
 def _flux(d: Discretisation, theta: float, k_c: float) -> float:
     """The largest heat flux into the body at t = 0 on parts that are not cooled; theta(0), a constant, conducts none."""
-    cooled, loads = d.scene.supports.temperature, d.loads
+    cooled, loads = d.full.supports.temperature, d.loads
     fluxes = [evaluate(h, _nodes(d, part), 0.0, 1) for part, h in loads.heat_flux.items() if part not in cooled]
     x = np.asarray(d.surface.positions)
     exchange = k_c * (evaluate(loads.foundation_temperature, x, 0.0, 1) - theta) + evaluate(
@@ -92,10 +92,10 @@ def _traction(d: Discretisation, u0: Array, v0: Array, theta: float) -> float:
     On Gamma_C f = gC - p nu - the friction nearest to balance that Coulomb's law allows: opposite to the slip, or in stick
     at most the bound.
     """
-    stress, contact = -theta * np.asarray(d.problem.material.expansion), d.scene.contact
+    stress, contact = -theta * np.asarray(d.problem.material.expansion), d.full.contact
     worst = 0.0
     for part, facets in d.mesh.parts.items():
-        if part in d.scene.supports.displacement or part == contact.part:
+        if part in d.full.supports.displacement or part == contact.part:
             continue
         normals = _normals(d, np.asarray(facets))
         x = np.asarray(d.mesh.nodes)[np.asarray(facets)].mean(axis=1)

@@ -52,7 +52,7 @@ from warmslip.manufactured import errors, slipping
 from warmslip.problem import make_mesh
 from warmslip.rates import least_squares
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Manufactured
 from warmslip.verify import line
 from warmslip.verify.bound_fields import Exact, Rule, strain
@@ -83,7 +83,7 @@ CLAIMED = 1.0  # Theorem 4.1: no term is slower
 class Bound:
     """Watches a run with the manufactured data and keeps, of every step, what the bound and the error are summed from."""
 
-    def __init__(self, scene: Scene, solution: Manufactured, exact: Exact) -> None:
+    def __init__(self, scene: FullScene, solution: Manufactured, exact: Exact) -> None:
         mesh = make_mesh(scene)
         self._k, self._solution, self._exact = scene.step, solution, exact
         self._nodes = np.asarray(mesh.nodes)
@@ -185,13 +185,13 @@ class Bound:
 
 
 @cache
-def known() -> tuple[Scene, Manufactured, Exact]:
+def known() -> tuple[FullScene, Manufactured, Exact]:
     """The scene whose data the solution has, the solution, and its derivatives."""
-    scene = warmslip.load("paper_isotropic")
+    scene = warmslip.load("paper_isotropic").full()
     return scene, slipping(scene), Exact.of(scene)
 
 
-def measure(coupling: str, levels: Sequence[int], scene: Scene | None = None) -> list[dict[str, Any]]:
+def measure(coupling: str, levels: Sequence[int], scene: FullScene | None = None) -> list[dict[str, Any]]:
     """A row for each h = k = 1/level: roots of all terms, the largest of them, bound, error, and what ties them to the paper.
 
     `u_w_theta` is the error of Theorem 4.1, `quadrature` how far two quadratures of max |w|_L2 and |theta|_L2 are apart, and
@@ -222,7 +222,9 @@ def measure(coupling: str, levels: Sequence[int], scene: Scene | None = None) ->
     return rows
 
 
-def lines(coupling: str = "lagged", levels: Sequence[int] = (8, 16, 32, 64), scene: Scene | None = None) -> list[Line]:
+def lines(
+    coupling: str = "lagged", levels: Sequence[int] = (8, 16, 32, 64), scene: FullScene | None = None
+) -> list[Line]:
     """Takes about 30 s; raises ValueError for fewer than three levels."""
     if len(levels) < 3:
         raise ValueError(f"{len(levels)} levels say nothing about an order; give at least three")

@@ -14,7 +14,7 @@ import sympy as sp
 from warmslip import _core, symbolic
 from warmslip.loads import Array
 from warmslip.manufactured import sliding
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Function, T
 
 POINTS = 4  # a direction: exact to degree 7
@@ -36,7 +36,7 @@ class Exact:
     stress: Function
 
     @classmethod
-    def of(cls, scene: Scene) -> Exact:
+    def of(cls, scene: FullScene) -> Exact:
         fields = sliding()
         u, w, theta = fields.u, fields.w, sp.Matrix([fields.theta])
         axes = symbolic.axes(2)

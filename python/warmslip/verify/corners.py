@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warmslip.problem import Discretisation
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 
 LARGEST = 2.0  # exponents beyond it do not limit P1 elements
 
@@ -72,7 +72,7 @@ def thermal_exponent(conductivity: Any, sides: NDArray[np.float64], angle: float
     return float(min(LARGEST, np.pi / opening if cooled[0] == cooled[1] else np.pi / (2 * opening)))
 
 
-def leading_lame(scene: Scene) -> tuple[float, float]:
+def leading_lame(scene: FullScene) -> tuple[float, float]:
     """(lambda, mu) of the viscosity, or of the elasticity where there is no viscosity."""
     viscosity = scene.viscosity.pair(scene.mesh.dim)
     return viscosity if viscosity[1] > 0 else scene.elasticity.pair(scene.mesh.dim)
@@ -82,7 +82,7 @@ def corner_exponents(discretisation: Discretisation) -> list[Corner]:
     """All corners of a plane body, in mesh numbering. Raises ValueError for d = 3, where edges take the place of corners."""
     if discretisation.dim != 2:
         raise ValueError("corner exponents are for plane bodies; in space edges and vertices have their own")
-    scene, nodes = discretisation.scene, np.asarray(discretisation.mesh.nodes)
+    scene, nodes = discretisation.full, np.asarray(discretisation.mesh.nodes)
     at: dict[int, list[tuple[str, int]]] = {}
     for part, facets in discretisation.mesh.parts.items():
         for a, b in np.asarray(facets).tolist():

@@ -29,7 +29,7 @@ from scipy.special import gammaln
 import warmslip
 from warmslip.loads import Array
 from warmslip.rates import least_squares
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify import line
 from warmslip.verify.fixed_point import ROUND_OFF, Fields, Iteration, Lambda, iterate, solution
 from warmslip.verify.line import Line
@@ -40,12 +40,12 @@ READINGS = ("printed", "mixed", "isotropic", "consistent")
 STRONG, STRONGER = 100.0, 200.0
 
 
-def heated(scene: Scene, factor: float) -> Scene:
+def heated(scene: FullScene, factor: float) -> FullScene:
     """The scene with R times `factor`; only the product of M and R matters to how fast Lambda contracts."""
     return scene.override(**{"heat.heating.tensor": (factor * np.array(scene.heat.heating.tensor)).tolist()})
 
 
-def powers(scene: Scene, count: int) -> tuple[Array, Array]:
+def powers(scene: FullScene, count: int) -> tuple[Array, Array]:
     """m = 0 .. count-1 and log of prod_j=1..m (T + jk)/(j+1), the discrete T^m/(m+1)!, both (count,)."""
     m = np.arange(count, dtype=float)
     steps = scene.time.steps
@@ -71,7 +71,7 @@ def table(run: Iteration, c: float) -> Iterator[dict[str, Any]]:
         yield {"T": run.scene.time.end, "iteration": 2 * m, "difference": size, "factor": factor, "bound": most}
 
 
-def setting(reading: str, *, n: int, steps: int, end: float = 1.0, hot: float = 0.0, factor: float = 1.0) -> Scene:
+def setting(reading: str, *, n: int, steps: int, end: float = 1.0, hot: float = 0.0, factor: float = 1.0) -> FullScene:
     """The paper's scene, monolithic, with theta_F = `hot`, T = `end` and R times `factor`."""
     values = {
         "mesh.n": n,
@@ -80,7 +80,7 @@ def setting(reading: str, *, n: int, steps: int, end: float = 1.0, hot: float = 
         "time.coupling": "monolithic",
         "contact.heat_exchange.foundation_temperature": hot,
     }
-    return heated(warmslip.load(f"paper_{reading}").override(**values), factor)
+    return heated(warmslip.load(f"paper_{reading}").full().override(**values), factor)
 
 
 def missed(run: Iteration, solved: Fields) -> float:

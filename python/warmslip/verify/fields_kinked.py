@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from warmslip import symbolic
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Description, T, X
 from warmslip.verify.fields_smooth import HALF, TENTH, THOUSANDTH, cooled_walls
 
@@ -26,7 +26,7 @@ def _ramp(distance: Any, power: int) -> Any:
     return symbolic.when(distance > 0, distance**power)
 
 
-def opening(scene: Scene, lag: float = 0.0) -> Description:
+def opening(scene: FullScene, lag: float = 0.0) -> Description:
     """Slip to the right; the penetration is proportional to x - OPENING(t), so that the pressure has a kink there.
 
     u, w and theta are smooth and the traction is Lipschitz: quadrature errors at the kink are O(h^2) and of changing
@@ -41,7 +41,7 @@ def opening(scene: Scene, lag: float = 0.0) -> Description:
     )
 
 
-def stick_slip(scene: Scene, lag: float = 0.0, power: int = 3) -> Description:
+def stick_slip(scene: FullScene, lag: float = 0.0, power: int = 3) -> Description:
     """Pressed everywhere; the slip is the ramp (x - STICKING)_+^power, the friction mu p (1 - (STICKING - x)_+).
 
     With power = 3 the body force is Lipschitz across x = STICKING(t) and the orders of smooth data are owed. With power

@@ -13,25 +13,25 @@ from typing import Any
 import sympy as sp
 
 from warmslip import symbolic
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Description, T, X, Y
 
 HALF, TENTH, THOUSANDTH = sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(1, 1000)
 
 
-def cooled_walls(scene: Scene) -> Any:
+def cooled_walls(scene: FullScene) -> Any:
     """A temperature that is zero everywhere but inside and on the contact part."""
     *tangents, n = symbolic.axes(scene.mesh.dim)
     return sp.prod([sp.sin(sp.pi * s) for s in tangents]) * (1 - n) * (1 + n / 2)
 
 
-def waves(scene: Scene) -> Any:
+def waves(scene: FullScene) -> Any:
     """A pressure profile between 2 and 5/2 on the contact part, gentle enough for coarse meshes."""
     tangents = symbolic.axes(scene.mesh.dim)[:-1]
     return 2 + sum(sp.cos(sp.pi * s / 2) for s in tangents) / (2 * len(tangents))
 
 
-def slip(scene: Scene, lag: float = 0.0) -> Description:
+def slip(scene: FullScene, lag: float = 0.0) -> Description:
     """Slip everywhere; in space its direction turns along the surface and in time. Supports as in the paper's problem."""
     n = symbolic.axes(scene.mesh.dim)[-1]
     along = [
@@ -43,7 +43,7 @@ def slip(scene: Scene, lag: float = 0.0) -> Description:
     return Description(sp.Matrix([*u, down]), TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T)), "slip", lag=lag)
 
 
-def slip_by_law(scene: Scene, lag: float = 0.0) -> Description:
+def slip_by_law(scene: FullScene, lag: float = 0.0) -> Description:
     """Slip under the paper's law alone: all fields grow as exp(t), and sigma_tau = -mu p w_tau/|w_tau| holds on n = 0.
 
     The tangential part a(1 - n^2) + b n (1 - n) has the slip a, and b is what sigma_tau lacks without it: b changes neither the
@@ -69,7 +69,7 @@ def slip_by_law(scene: Scene, lag: float = 0.0) -> Description:
     return replace(plain, u=plain.u + sp.Matrix([*(c * n * (1 - n) for c in b), 0]) * grow)
 
 
-def stick(scene: Scene, lag: float = 0.0) -> Description:
+def stick(scene: FullScene, lag: float = 0.0) -> Description:
     """Stick under the paper's law alone: the tangential displacement of the contact part is frozen, the body above it moves."""
     dim = scene.mesh.dim
     *tangents, n = symbolic.axes(dim)
@@ -81,7 +81,7 @@ def stick(scene: Scene, lag: float = 0.0) -> Description:
     return Description(u, TENTH * cooled_walls(scene) * (2 + sp.sin(3 * T)), "stick", own=True, lag=lag)
 
 
-def affine(scene: Scene, lag: float = 0.0) -> Description:
+def affine(scene: FullScene, lag: float = 0.0) -> Description:
     """Affine in space, anything in time, with a constant pressure and direction of slip: P1 elements make no error in space.
 
     With `lag` = k the discrete solution is the exact one to round-off on any mesh; without, its error is that of backward

@@ -13,7 +13,7 @@ import numpy as np
 from warmslip.loads import Array
 from warmslip.problem import Discretisation, discretise
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 
 ROUND_OFF = 1e-13  # of the first difference: what follows is rounding, no contraction
 
@@ -26,18 +26,18 @@ class Fields:
     theta: Array
 
 
-def decoupled(scene: Scene) -> Scene:
+def decoupled(scene: FullScene) -> FullScene:
     """The scene with M = R = 0."""
     zero = np.zeros((scene.mesh.dim, scene.mesh.dim)).tolist()
     return scene.override(**{"heat.expansion.tensor": zero, "heat.heating.tensor": zero})
 
 
-def _right(outcome: str, scene: Scene) -> None:
+def _right(outcome: str, scene: FullScene) -> None:
     if outcome != "right":
         raise RuntimeError(f"'{scene.title}' ended: {outcome}")
 
 
-def solution(scene: Scene) -> Fields:
+def solution(scene: FullScene) -> Fields:
     """The scene's run with its own coupling. Raises RuntimeError when it does not end right."""
     job = Run(scene)
     d = job.discretisation
@@ -52,7 +52,7 @@ class Lambda:
     The scene's coupling says from which step the frozen terms are taken. `sign` is that of zeta in f_zeta = f + sign zeta.
     """
 
-    def __init__(self, scene: Scene, sign: float = 1.0) -> None:
+    def __init__(self, scene: FullScene, sign: float = 1.0) -> None:
         self.scene, self._sign = scene, sign
         self._apart: Discretisation = discretise(decoupled(scene))
         coupled = discretise(scene)
@@ -74,7 +74,7 @@ class Lambda:
         stepper, found = d.stepper(), []
         read_w, read_theta, force, heat = (d.layout.vector(block) for block in (d.dim, 1, d.dim, 1))
         for n in range(self.scene.time.steps):
-            f, q, gap = d.load_vectors.at((n + 1) * self.scene.step)
+            f, q, gap, *_ = d.load_vectors.at((n + 1) * self.scene.step)
             d.layout.distribute(w[n].ravel(), read_w)
             d.layout.distribute(theta[n], read_theta)
             self._expansion.mult(read_theta, force)
@@ -109,7 +109,7 @@ def _delayed(values: Array, initial: Array) -> Array:
 class Iteration:
     """Differences |Lambda^(n+1) 0 - Lambda^n 0|, n = 0, 1, ..., and the last iterate."""
 
-    scene: Scene
+    scene: FullScene
     differences: list[float]
     last: Fields
     zero: Fields
@@ -126,7 +126,7 @@ class Iteration:
         return self.pairs[1:] / self.pairs[:-1]
 
 
-def iterate(scene: Scene, most: int = 200, sign: float = 1.0) -> Iteration:
+def iterate(scene: FullScene, most: int = 200, sign: float = 1.0) -> Iteration:
     """Lambda from 0 until two differences in a row are rounding, or `most` times."""
     mapping = Lambda(scene, sign)
     now = zero = mapping.zero

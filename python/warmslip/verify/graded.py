@@ -14,7 +14,7 @@ from warmslip import rates
 from warmslip.errors import TERMS, Comparison, Largest
 from warmslip.problem import Discretisation, discretise, make_mesh
 from warmslip.runner import IDENTITIES, residuals, worse
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify.corners import corner_exponents
 from warmslip.verify.grading import TimeBlock, Triangulation, family, time_blocks
 from warmslip.verify.line import Line, below, order
@@ -42,7 +42,7 @@ UNIFORM = Grids({}, 0, 1)
 class March:
     """A scene on one mesh, stepped through blocks of constant step size; operators are assembled once."""
 
-    def __init__(self, scene: Scene, mesh: Any, blocks: list[TimeBlock]) -> None:
+    def __init__(self, scene: FullScene, mesh: Any, blocks: list[TimeBlock]) -> None:
         self.discretisation: Discretisation = discretise(scene, mesh=mesh)
         self.blocks, self.stepper, self.steps = blocks, None, 0
         self.worst = dict.fromkeys(IDENTITIES, 0.0)
@@ -51,11 +51,11 @@ class March:
         """A report a step. Raises RuntimeError, with the outcome, when a step is not right."""
         d, loads = self.discretisation, self.discretisation.load_vectors
         for block in self.blocks:
-            one = d.scene.override(**{"time.end": block.k, "time.steps": 1})
+            one = d.full.override(**{"time.end": block.k, "time.steps": 1})
             stepper = replace(d, scene=one).stepper()
             if self.stepper is not None:
                 state = self.stepper
-                stepper.start(state.u, state.w, state.theta, loads.at(block.begin)[2], block.begin)
+                stepper.start(state.u, state.w, state.theta, loads.on_points("gap", block.begin), block.begin)
             self.stepper = stepper
             for n in range(1, block.steps + 1):
                 report = stepper.advance(*loads.at(block.begin + n * block.k))
@@ -70,7 +70,7 @@ class March:
 
 
 def study(
-    scene: Scene,
+    scene: FullScene,
     grids: Grids,
     levels: list[int],
     reference: int,
@@ -150,13 +150,13 @@ def unbiased(rows: list[dict[str, Any]], reference: int) -> list[dict[str, Any]]
     return out
 
 
-def grids(scene: Scene, halvings: int = 8) -> Grids:
+def grids(scene: FullScene, halvings: int = 8) -> Grids:
     """The grids that the singular corners and the start of a scene ask for, k = 4h."""
     corners = corner_exponents(discretise(scene.override(**{"mesh.n": COARSEST})))
     return Grids({corner.point: corner.exponent_u for corner in corners if corner.exponent_u < 1}, halvings, 4)
 
 
-def lines(name: str, scene: Scene, graded: list[dict[str, Any]], uniform: list[dict[str, Any]]) -> list[Line]:
+def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: list[dict[str, Any]]) -> list[Line]:
     """Order 1 +- 0.1 at every halving of the graded study, by the unbiased errors and between successive grids; less in every
     term of the uniform one; closed books."""
     out = []

@@ -16,7 +16,7 @@ from warmslip import _core
 from warmslip.loads import Array
 from warmslip.problem import Discretisation, discretise, make_mesh
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify.line import Line, below
 
 # two orders above what is observed, four below the smallest fault worth finding
@@ -43,7 +43,7 @@ UNITS = {
 }
 
 
-def finish(scene: Scene, mesh: Any = None, discretisation: Discretisation | None = None) -> dict[str, Array]:
+def finish(scene: FullScene, mesh: Any = None, discretisation: Discretisation | None = None) -> dict[str, Array]:
     """The final u (nodes, d), w (nodes, d), theta (nodes,). Raises RuntimeError when the run does not end right."""
     job = Run(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
     for _ in job.steps():
@@ -63,7 +63,7 @@ def apart(one: dict[str, Array], other: dict[str, Array]) -> float:
     return max(float(np.abs(one[name] - other[name]).max() / size) for name, size in sizes.items() if size > 0)
 
 
-def in_units(scene: Scene, units: Units) -> Scene:
+def in_units(scene: FullScene, units: Units) -> FullScene:
     """The same problem in other units; displacements scale like lengths."""
     length, time, stress, temperature = units.length, units.time, units.stress, units.temperature
 
@@ -95,7 +95,7 @@ def in_units(scene: Scene, units: Units) -> Scene:
     return scene.override(**values)
 
 
-def units_apart(scene: Scene, units: Units) -> float:
+def units_apart(scene: FullScene, units: Units) -> float:
     """Solved in other units and scaled back: powers of two change exponents alone, so a hidden absolute number shows."""
     plain = scene.override(
         elasticity={"lame": list(scene.elasticity.pair(scene.mesh.dim))},
@@ -106,7 +106,7 @@ def units_apart(scene: Scene, units: Units) -> float:
     return apart(finish(plain), {name: values / factors[name] for name, values in other.items()})
 
 
-def mirror_apart(scene: Scene) -> float:
+def mirror_apart(scene: FullScene) -> float:
     """The body seen in a mirror across its first axis; the parts keep their names and their loads are mirrored."""
     d = scene.mesh.dim
     flip = np.diag([-1.0] + [1.0] * (d - 1))
@@ -135,7 +135,7 @@ def mirror_apart(scene: Scene) -> float:
     return apart(finish(scene), {"u": seen["u"] @ flip, "w": seen["w"] @ flip, "theta": seen["theta"]})
 
 
-def renumbering_apart(scene: Scene, seed: int = 1) -> float:
+def renumbering_apart(scene: FullScene, seed: int = 1) -> float:
     """Nodes and cells in a random order."""
     mesh, random = make_mesh(scene), np.random.default_rng(seed)
     nodes, cells = np.asarray(mesh.nodes), np.asarray(mesh.cells)
@@ -147,7 +147,7 @@ def renumbering_apart(scene: Scene, seed: int = 1) -> float:
     return apart(finish(scene), {name: values[new] for name, values in other.items()})
 
 
-def restart_apart(scene: Scene) -> float:
+def restart_apart(scene: FullScene) -> float:
     """Stopped half way, and started again from u, w, theta alone. The contact solver starts from nothing, too."""
     d = discretise(scene)
     through = finish(scene, discretisation=d)
@@ -165,7 +165,7 @@ def restart_apart(scene: Scene) -> float:
     return apart(through, {name: d.field(getattr(last, name)) for name in ("u", "w", "theta")})
 
 
-def rigid_velocity_apart(scene: Scene, speed: float = 0.5) -> float:
+def rigid_velocity_apart(scene: FullScene, speed: float = 0.5) -> float:
     """Released from its supports and without friction, the body moves along the first axis as well: u gains speed t.
 
     For a contact part that is flat and parallel to the first axis, and a positive density. The velocity is in units of
@@ -185,7 +185,7 @@ def _lists(d: int, nodes: Array, cells: Any, parts: dict[str, Any]) -> Any:
     return make.from_lists(nodes, cells.astype(np.int32), {k: np.asarray(v, dtype=np.int32) for k, v in parts.items()})
 
 
-def lines(name: str, scene: Scene) -> list[Line]:
+def lines(name: str, scene: FullScene) -> list[Line]:
     """Every invariance of one scene, and the worst residual of each identity of its ledger."""
     job = Run(scene)
     for _ in job.steps():

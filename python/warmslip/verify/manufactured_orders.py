@@ -16,7 +16,7 @@ from warmslip import rates
 from warmslip.manufactured import derive, errors
 from warmslip.problem import make_mesh
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Description, Manufactured
 from warmslip.verify import line
 from warmslip.verify.line import Line
@@ -35,15 +35,15 @@ class Family:
     """
 
     case: str
-    scene: Scene
-    fields: Callable[[Scene], Description]
+    scene: FullScene
+    fields: Callable[[FullScene], Description]
     grids: Sequence[tuple[int, int]]
     owed: dict[str, float]
     refined: Literal["h", "k"] = "h"
     points: int = 3
 
     @property
-    def scenes(self) -> list[Scene]:
+    def scenes(self) -> list[FullScene]:
         return [self.scene.override(**{"mesh.n": n, "time.steps": steps}) for n, steps in self.grids]
 
 
@@ -90,7 +90,7 @@ def orders(family: Family) -> list[Line]:
     ]
 
 
-def distorted(scene: Scene, amount: float = 0.2, seed: int = 1) -> Any:
+def distorted(scene: FullScene, amount: float = 0.2, seed: int = 1) -> Any:
     """The scene's mesh with its nodes moved by up to `amount` of a brick a direction, the faces of the box kept flat."""
     mesh = make_mesh(scene)
     x = np.asarray(mesh.nodes)

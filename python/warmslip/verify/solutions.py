@@ -17,7 +17,7 @@ from warmslip import symbolic
 from warmslip.errors import TERMS
 from warmslip.manufactured import derive, errors, sliding
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.symbolic import Description
 from warmslip.verify import line
 from warmslip.verify.fields_kinked import OPENING, STICKING, opening, stick_slip
@@ -33,12 +33,12 @@ NEAR = 2.0  # mesh sizes within which a status may differ from the exact one
 DOUBLED, FINER = ((8, 8), (16, 16), (32, 32)), ((16, 16), (32, 32), (64, 64))
 FINER_IN_SPACE = ((16, 3), (32, 3), (64, 3))
 SQUARED = ((8, 16), (16, 64), (32, 256))
-Lagged = Callable[[Scene, float], Description]
+Lagged = Callable[[FullScene, float], Description]
 
 
 def setting(
     dim: int, values: Mapping[str, Any] | None = None, *, coupling: str = "staggered", floating: bool = False
-) -> Scene:
+) -> FullScene:
     """The paper's scene or the block with full tensors K, M and R and other `values`; `floating` takes all supports away."""
     tensor = (np.eye(dim) + 0.2 * np.ones((dim, dim))).tolist()
     keys: dict[str, Any] = {
@@ -50,10 +50,10 @@ def setting(
     }
     if floating:
         keys |= {"supports.displacement": [], "supports.temperature": []}
-    return warmslip.load("paper_isotropic" if dim == 2 else "block_3d").override(**keys | dict(values or {}))
+    return warmslip.load("paper_isotropic" if dim == 2 else "block_3d").full().override(**keys | dict(values or {}))
 
 
-def lagged(fields: Lagged) -> Callable[[Scene], Description]:
+def lagged(fields: Lagged) -> Callable[[FullScene], Description]:
     """Fields with data of the discrete scheme at the scene's step."""
     return lambda scene: fields(scene, scene.step)
 
@@ -154,7 +154,7 @@ def families(full: bool = True) -> Iterator[Family]:
         for name, fields in smooth.items():
             yield Family(f"{name}, 2D, {coupling}, space", flat, lagged(fields), space, SPACE)
         if full:
-            paper = warmslip.load("paper_isotropic", [f"time.coupling={coupling}"])
+            paper = warmslip.load("paper_isotropic", [f"time.coupling={coupling}"]).full()
             # monolithic, the error of w in time is too small beside that in space for a slope on these grids
             owed = {term: 1.0 for term in TERMS if (coupling, term) != ("monolithic", "w_L2")}
             case = f"slip with the paper's data, 2D, {coupling}, h = k"

@@ -44,9 +44,9 @@ def unchanged(folder: Path) -> list[Line]:
         for coupling in ("staggered", "monolithic"):
             keys = {"mesh.n": 12, "time.steps": 12, "time.coupling": coupling}
             out += invariances.lines(
-                f"{reading}, {coupling}", warmslip.load(f"paper_{reading}").override(**HOT, **keys)
+                f"{reading}, {coupling}", warmslip.load(f"paper_{reading}").full().override(**HOT, **keys)
             )
-    block = warmslip.load("block_3d").override(**{"mesh.n": 3, "time.steps": 4})
+    block = warmslip.load("block_3d").full().override(**{"mesh.n": 3, "time.steps": 4})
     return out + invariances.lines("block in space", block)
 
 
@@ -57,7 +57,7 @@ def audited(folder: Path) -> list[Line]:
 
 def true_orders(folder: Path) -> list[Line]:
     """Figure 5, done right: the paper's problem on graded and on uniform grids, the reference's own error taken off."""
-    scene = warmslip.load("paper_mixed").override(**HOT)
+    scene = warmslip.load("paper_mixed").full().override(**HOT)
     studies = {
         "graded": graded.unbiased(graded.study(scene, graded.grids(scene), [32, 64, 128, 256], 512), 512),
         "uniform": graded.unbiased(graded.study(scene, graded.UNIFORM, [16, 32, 64, 128], 256), 256),

@@ -10,7 +10,7 @@ import numpy as np
 from warmslip.loads import Array, Loads
 from warmslip.problem import discretise, mandel
 from warmslip.runner import Run
-from warmslip.scene import Scene, build
+from warmslip.scene import FullScene, build_full
 from warmslip.tables import IsotropicTable
 from warmslip.verify.grading import Triangulation
 
@@ -20,7 +20,7 @@ NORMALS = {"left": np.array([-1.0, 0.0]), "right": np.array([1.0, 0.0]), "top": 
 _ZERO = [[0.0, 0.0], [0.0, 0.0]]
 
 
-def blank(**keys: Any) -> Scene:
+def blank(**keys: Any) -> FullScene:
     """A floating plane body without any physics but what `keys` add, `__` for the dots: blank(inertia__density=1.0)."""
     data: dict[str, Any] = {
         "mesh": {"shape": "square"},
@@ -39,7 +39,7 @@ def blank(**keys: Any) -> Scene:
         for table in tables:
             place = place.setdefault(table, {})
         place[last] = value
-    return build(data)
+    return build_full(data)
 
 
 def distorted(counts: tuple[int, int], lengths: tuple[float, float], *, seed: int = 1) -> Triangulation:
@@ -70,7 +70,7 @@ def crossed(x: Array, y: Array) -> Triangulation:
     return Triangulation(np.vstack([grid.reshape(-1, 2), middle.reshape(-1, 2)]), np.vstack(cells), parts)
 
 
-def run(scene: Scene, loads: Loads | None = None, mesh: Triangulation | None = None) -> Run:
+def run(scene: FullScene, loads: Loads | None = None, mesh: Triangulation | None = None) -> Run:
     """A scene ready to be stepped by `steps`, with its own loads and mesh where none are given."""
     return Run(scene, discretisation=discretise(scene, loads=loads, mesh=None if mesh is None else mesh.mesh()))
 

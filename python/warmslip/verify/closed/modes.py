@@ -48,7 +48,8 @@ def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Run:
 def _modes(job: Run, count: int) -> tuple[Array, Array]:
     """The lowest eigenvalues omega^2 (count,) and modes (count, nodes, 2) of the clamped body, mass-normalised."""
     d = job.discretisation
-    elastic, mass = _scipy(d.operators.elasticity), DENSITY * _scipy(d.operators.vector_mass)
+    unit = 1 / d.full.inertia.density  # the density of the prediction is the one written above
+    elastic, mass = _scipy(d.operators.elasticity), DENSITY * unit * _scipy(d.operators.inertia)
     held = np.zeros((len(bench.nodes(job)), 2))
     held[bench.on(job, "top")] = 1
     vector = d.layout.vector(2)

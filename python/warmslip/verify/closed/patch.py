@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from warmslip.loads import Array, Loads
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify.closed import bench
 from warmslip.verify.line import Line, below
 
@@ -18,7 +18,7 @@ EXPANSION = np.array([[1.1, 0.3], [0.3, 0.8]])
 HEATING = np.array([[-0.6, 0.2], [0.2, 0.9]])
 
 
-def material(**keys: Any) -> Scene:
+def material(**keys: Any) -> FullScene:
     """A floating viscoelastic body with inertia above a foundation with friction, and `keys` besides (see `bench.blank`)."""
     return bench.blank(
         **{

@@ -13,7 +13,7 @@ from warmslip.errors import ExactErrors
 from warmslip.loads import Array
 from warmslip.rates import least_squares
 from warmslip.runner import Run
-from warmslip.scene import Scene
+from warmslip.scene import FullScene
 from warmslip.verify.closed import bench
 from warmslip.verify.line import Line, below, near, order
 
@@ -44,7 +44,7 @@ def series(y: Array, t: float, steps: int | None = None) -> Array:
     return np.asarray(SLOPE * z - np.sin(z[:, None] * b) @ (SLOPE * moment / norm * decay))
 
 
-def _scene(n: int, end: float, steps: int) -> Scene:
+def _scene(n: int, end: float, steps: int) -> FullScene:
     return bench.blank(
         mesh__n=[max(1, n // 4), n],
         mesh__lengths=[HEIGHT / 4, HEIGHT],

@@ -1,0 +1,229 @@
+"""What the tables of a scene must agree on. A sentence a problem, with its cure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warmslip import tables as t
+from warmslip.expressions import Expression
+
+if TYPE_CHECKING:
+    from warmslip.scene import Scene
+
+SHORTEST = 1e-150  # step, time: its inverse is squared on the way
+
+
+def problems(scene: Scene) -> list[str]:
+    """Everything that is wrong between the tables of a scene."""
+    return [
+        *_parts(scene),
+        *_sizes(scene),
+        *_materials(scene),
+        *_blocks(scene),
+        *_regions(scene),
+        *_time(scene),
+    ]
+
+
+def contact_keys(scene: Scene) -> list[tuple[str, t.ContactTable]]:
+    """Every contact table with its key: `contact`, or `contact.0`, `contact.1` of several."""
+    several = isinstance(scene.contact, list)
+    return [(f"contact.{i}" if several else "contact", c) for i, c in enumerate(scene.contacts)]
+
+
+def _parts(scene: Scene) -> Iterator[str]:
+    known = scene.mesh.parts
+    held, cooled = list(scene.supports.displacement), list(scene.supports.temperature)
+    named = {
+        "supports.displacement": held,
+        "supports.temperature": cooled,
+        "loads.traction": list(scene.loads.traction),
+        "loads.heat_flux": list(scene.loads.heat_flux),
+        **{f"{key}.part": [contact.part] for key, contact in contact_keys(scene)},
+    }
+    for key, parts in named.items():
+        for part in parts:
+            if part not in known:
+                has = ", ".join(known) or "no named part; give its facets physical names"
+                yield f"{key}: unknown boundary part '{part}'; a {scene.mesh.name} has {has}"
+        if len(set(parts)) < len(parts):
+            yield f"{key}: a part is named twice; name each once"
+    for part in scene.loads.traction:
+        if part in held:
+            yield f"loads.traction.{part}: the part is clamped and a traction on it does nothing; remove one of the two"
+    for part in scene.loads.heat_flux:
+        if part in cooled:
+            yield f"loads.heat_flux.{part}: the part's temperature is given and a flux does nothing; remove one of the two"
+    for key, contact in contact_keys(scene):
+        if contact.stiffness is not None and contact.part in held:
+            yield f"supports.displacement: '{contact.part}' is the contact part and cannot be held; remove it"
+        if contact.part in cooled:
+            yield f"supports.temperature: '{contact.part}' is the contact part and cannot be held; remove it"
+        if sum(c.part == contact.part for c in scene.contacts) > 1 and key.endswith(".0"):
+            yield f"{key}.part: '{contact.part}' has two laws; give each part one"
+
+
+def _sizes(scene: Scene) -> Iterator[str]:
+    d, body = scene.mesh.dim, scene.mesh.name
+    vectors: dict[str, Any] = {
+        "loads.body": scene.loads.body,
+        "initial.displacement": scene.initial.displacement,
+        "initial.velocity": scene.initial.velocity,
+        **{f"loads.traction.{part}": value for part, value in scene.loads.traction.items()},
+        **{f"supports.displacement.{part}": value for part, value in scene.supports.moved.items()},
+    }
+    for key, value in vectors.items():
+        if value is not None and len(value) != d:
+            yield f"{key} has {len(value)} components; a {body} needs {d}"
+    for key, heat in _heats(scene):
+        for name, tensor in (
+            (f"{key}.conductivity", heat.conductivity),
+            (f"{key}.expansion.tensor", heat.expansion and heat.expansion.tensor),
+            (f"{key}.heating.tensor", heat.heating and heat.heating.tensor),
+        ):
+            if not isinstance(tensor, list):
+                continue
+            if len(tensor) != d or any(len(row) != d for row in tensor):
+                yield f"{name} must be a {d} x {d} matrix"
+            elif any(tensor[i][j] != tensor[j][i] for i in range(d) for j in range(i)):
+                yield f"{name} must be symmetric; set its entries [i][j] and [j][i] equal"
+    for key in ("displacement", "velocity"):
+        for i, value in enumerate(getattr(scene.initial, key) or []):
+            if isinstance(value, str) and Expression(value).of_time:
+                yield f"initial.{key}.{i}: initial data cannot depend on t; leave it out"
+    if isinstance(scene.initial.temperature, str) and Expression(scene.initial.temperature).of_time:
+        yield "initial.temperature: initial data cannot depend on t; leave it out"
+
+
+def _heats(scene: Scene) -> list[tuple[str, t.HeatTable]]:
+    tables = [("heat", scene.heat), *((f"regions.{name}.heat", region.heat) for name, region in scene.regions.items())]
+    return [(key, table) for key, table in tables if table is not None]
+
+
+def _materials(scene: Scene) -> Iterator[str]:
+    d = scene.mesh.dim
+    tables = [(key, getattr(scene, key)) for key in ("elasticity", "viscosity")]
+    for name, region in scene.regions.items():
+        tables += [(f"regions.{name}.{key}", getattr(region, key)) for key in ("elasticity", "viscosity")]
+    for key, table in tables:
+        if table is None:
+            continue
+        if d == 3 and table.assumption in ("plane_stress", "plane_strain"):
+            yield f"{key}.assumption: {table.assumption} has no meaning in a {scene.mesh.name}; use solid"
+        elif table.tensor is not None:
+            size = d * (d + 1) // 2
+            if len(table.tensor) != size:
+                yield f"{key}.tensor must be a {size} x {size} matrix"
+            elif _negative(table.tensor):
+                yield f"{key}: the tensor must not be negative; it has a negative eigenvalue"
+        else:
+            lam, mu = table.pair(d)
+            if mu < 0 or d * lam + 2 * mu < 0:
+                yield f"{key}: the tensor must not be negative; it needs mu >= 0 and {d} lambda + 2 mu >= 0"
+    for key, heat in _heats(scene):
+        k = heat.conductivity
+        if not isinstance(k, list):
+            k = [[k]]
+        if all(len(row) == len(k) for row in k) and _negative(k):
+            yield f"{key}.conductivity must not have a negative eigenvalue; heat would flow from cold to hot"
+
+
+def _negative(matrix: list[list[float]]) -> bool:
+    return float(np.linalg.eigvalsh(np.array(matrix))[0]) < -1e-12 * max(abs(x) for row in matrix for x in row)
+
+
+def _stiff(table: t.IsotropicTable | None, d: int) -> bool:
+    return table is not None and (table.tensor is not None or table.pair(d)[1] > 0)
+
+
+def _blocks(scene: Scene) -> Iterator[str]:
+    moves, heat = scene.moves, scene.heat
+    inertial = scene.inertia is not None and scene.inertia.density > 0
+    if not moves and heat is None and scene.inertia is None:
+        yield "scene: there is neither motion nor heat; give one of inertia, elasticity, viscosity and heat"
+        return
+    if not moves:
+        if scene.inertia is not None and heat is None:
+            yield (
+                "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
+            )
+        needed: dict[str, Any] = {
+            "loads.body": scene.loads.body,
+            "loads.traction": scene.loads.traction,
+            "supports.displacement": scene.supports.displacement,
+            "initial.displacement": scene.initial.displacement,
+            "initial.velocity": scene.initial.velocity,
+            "heat.expansion": heat and heat.expansion,
+            "heat.heating": heat and heat.heating,
+            **{f"{key}.stiffness": c.stiffness for key, c in contact_keys(scene)},
+        }
+        for key, value in needed.items():
+            if value:
+                yield f"{key}: a body without elasticity, viscosity and inertia does not move; remove it or give one of them"
+    elif not inertial:
+        if not (_stiff(scene.elasticity, scene.mesh.dim) or _stiff(scene.viscosity, scene.mesh.dim)):
+            yield (
+                "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
+            )
+        if not scene.supports.displacement:
+            yield (
+                "supports.displacement: the momentum operator is singular without support and without inertia; "
+                "clamp a part or give inertia.density > 0"
+            )
+    if heat is None:
+        cold: dict[str, Any] = {
+            "loads.heat_flux": scene.loads.heat_flux,
+            "supports.temperature": scene.supports.temperature,
+            "initial.temperature": scene.initial.temperature,
+            **{f"{key}.heat_exchange": c.heat_exchange for key, c in contact_keys(scene)},
+            **{f"{key}.friction_heating": c.friction_heating for key, c in contact_keys(scene)},
+        }
+        for key, value in cold.items():
+            if value:
+                yield f"{key}: there is no heat in this scene; remove it or give a table [heat]"
+    for key, contact in contact_keys(scene):
+        exchange = contact.heat_exchange
+        if contact.stiffness is None:
+            if exchange is None:
+                yield f"{key}: the part neither touches nor exchanges heat; give a stiffness or a table heat_exchange"
+            if contact.friction is not None:
+                yield f"{key}.friction: friction without contact; give a stiffness or remove it"
+            if contact.heats:
+                yield f"{key}: heat by pressure or friction needs contact; give a stiffness or remove it"
+        if contact.friction_heating is not None and contact.friction is None:
+            yield f"{key}.friction_heating: heat of a friction that is not there; give a table friction or remove it"
+        if contact.heats and scene.time.coupling == "monolithic" and moves:
+            yield f"time.coupling: heat by pressure or friction ({key}) needs 'staggered' or 'lagged'; use one of them"
+    if scene.time.coupling == "monolithic" and not (moves and heat is not None):
+        yield "time.coupling: monolithic couples motion and heat, and one of them is missing; leave the key out"
+
+
+def _regions(scene: Scene) -> Iterator[str]:
+    known = scene.mesh.regions
+    for name, region in scene.regions.items():
+        if region.where is None and name not in known:
+            has = f"the mesh has {', '.join(known)}" if known else "the mesh has none by name"
+            yield f"regions.{name}: unknown region; {has}, or say `where` with a formula of x, y, z"
+        if region.where is not None:
+            try:
+                if Expression(region.where).of_time:
+                    yield f"regions.{name}.where: a region cannot depend on t; leave it out"
+            except ValueError as error:
+                yield f"regions.{name}.where: {error}"
+        for key in ("inertia", "elasticity", "viscosity", "heat"):
+            if getattr(region, key) is not None and getattr(scene, key) is None:
+                yield f"regions.{name}.{key}: the body has no table [{key}]; give one for the rest of it"
+        if region.heat is not None and scene.heat is not None:
+            for key in ("expansion", "heating"):
+                if getattr(region.heat, key) is not None and getattr(scene.heat, key) is None:
+                    yield f"regions.{name}.heat.{key}: the body has no table [heat.{key}]; give one for the rest of it"
+            if "source" in region.heat.model_fields_set:
+                yield f"regions.{name}.heat.source: a source is given once, as a formula of x, y, z; move it to [heat]"
+
+
+def _time(scene: Scene) -> Iterator[str]:
+    if scene.step < SHORTEST:
+        yield f"time: a step of {scene.step:g} is too short to divide by; take fewer steps or a later end"
