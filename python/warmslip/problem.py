@@ -182,8 +182,10 @@ class Discretisation:
         Fields that the problem does not have are left aside.
         """
         u, w, theta = u.copy(), w.copy(), theta.copy()
-        for nodes, values in self.load_vectors.held(0, time).values():
-            u[nodes], w[nodes] = values, 0
+        for part, (nodes, values) in self.load_vectors.held(0, time).items():
+            u[nodes] = values
+            if part not in self.loads.displacement:  # a support that moves has the velocity that is given
+                w[nodes] = 0
         for nodes, values in self.load_vectors.held(1, time).values():
             theta[nodes] = values[:, 0]
         vectors: list[Any] = [None, None, None]

@@ -39,6 +39,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
         4 * eps * terms;  // what rounding makes of r; a point that is open all the same has no part in it
     if (r > -blur) rounding = std::max(rounding, point.weight * law.compliance.tangent(std::max(r, 0.0) + blur) * blur);
   }
+  largest = std::max(largest, widest);  // friction that needs no pressure
   *floor = std::numeric_limits<double>::infinity();
   if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))
     return std::numeric_limits<double>::infinity();
