@@ -10,6 +10,9 @@ import pytest
 from warmslip.verify import line, report, topics
 from warmslip.verify.line import Line
 
+COLUMNS = "fault,file,what,outcome,by,commit,key"
+CONTROL = "control,a.cpp,a comment,survived,nothing may notice"
+
 
 def one(observed: float = 1.0) -> Line:
     return line.near("a | case", "the answer is one", "analytic", 1.0, observed, 1e-3)
@@ -65,10 +68,10 @@ def test_audits_and_faults_are_told(tmp_path: Path) -> None:
             f"topic,statement,values,holds,meaning\n(H1),m > 0,m_b = {value}; M_b = inf,{holds},so it is\n"
         )
     (tmp_path / "mutants.csv").write_text(
-        "fault,file,what,outcome,by\n"
-        "sign,a.cpp,wrong sign,killed,unit/test_run.py::test_signs[x]\n"
-        "slow,a.cpp,a slower path,survived,the same answer\n"
-        "new,a.cpp,nobody knows,survived,\n"
+        f"{COLUMNS}\n"
+        "sign,a.cpp,wrong sign,killed,unit/test_run.py::test_signs[x],abc,1\n"
+        "slow,a.cpp,a slower path,survived,the same answer,abc,2\n"
+        "new,a.cpp,nobody knows,survived,,abc,3\n"
     )
     audits = [tmp_path / "audit_soft.csv", tmp_path / "audit_stiff.csv"]
     text, passed = report.markdown([tmp_path / "good.csv"], [], audits, tmp_path / "mutants.csv")
@@ -80,23 +83,25 @@ def test_audits_and_faults_are_told(tmp_path: Path) -> None:
     assert "| new | nobody knows | **unexplained** |" in text
 
 
-def killed(names: list[str], more: str) -> str:
-    lines = [f"{name},a.cpp,wrong,killed,unit/test_run.py::test_signs" for name in names]
-    return "\n".join(["fault,file,what,outcome,by", *lines, more]) + "\n"
+def killed(names: list[str], more: list[str]) -> str:
+    lines = [f"{name},a.cpp,wrong,killed,unit/test_run.py::test_signs,abc,1" for name in names]
+    return "\n".join([COLUMNS, *lines, *(f"{line},abc,1" for line in more)]) + "\n"
 
 
 @pytest.mark.parametrize(
-    ("more", "good", "words"),
+    ("count", "more", "good", "words"),
     [
-        ("slow,a.cpp,slower,survived,the same answer", True, "**20 of 21 killed (95.2 %)**"),
-        ("control,a.cpp,a comment,survived,nothing may notice", True, "**20 of 20 killed (100.0 %)**"),
-        ("control,a.cpp,a comment,killed,unit/test_a.py::test_b", False, "the score means nothing"),
-        ("broken,a.cpp,no syntax,invalid,error: expected", False, "**invalid**: error: expected"),
-        ("later,a.cpp,a sign,untried,", True, "1 not tried yet"),
+        (80, [CONTROL, "slow,a.cpp,slower,survived,the same answer"], True, "**80 of 81 killed (98.8 %)**"),
+        (80, [CONTROL], True, "**80 of 80 killed (100.0 %)**"),
+        (79, [CONTROL], False, "**79 of 79 killed (100.0 %)**"),
+        (80, [], False, "the score means nothing"),
+        (80, ["control,a.cpp,a comment,killed,unit/test_a.py::test_b"], False, "the score means nothing"),
+        (80, [CONTROL, "broken,a.cpp,no syntax,invalid,error: expected"], False, "**invalid**: error: expected"),
+        (80, [CONTROL, "later,a.cpp,a sign,untried,"], False, "1 not tried yet"),
     ],
 )
-def test_the_score_of_the_faults(tmp_path: Path, more: str, good: bool, words: str) -> None:
-    (tmp_path / "mutants.csv").write_text(killed([f"f{i}" for i in range(20)], more))
+def test_the_score_of_the_faults(tmp_path: Path, count: int, more: list[str], good: bool, words: str) -> None:
+    (tmp_path / "mutants.csv").write_text(killed([f"f{i}" for i in range(count)], more))
     text, explained = report.faults(tmp_path / "mutants.csv")
     assert explained is good
     assert words in "".join(text)
@@ -104,5 +109,5 @@ def test_the_score_of_the_faults(tmp_path: Path, more: str, good: bool, words: s
 
 
 def _nothing(folder: Path) -> Path:
-    (folder / "none.csv").write_text("fault,file,what,outcome,by\n")
+    (folder / "none.csv").write_text(f"{COLUMNS}\n")
     return folder / "none.csv"

@@ -231,6 +231,7 @@ def lines(
     rows = measure(coupling, levels, scene)
     case = f"bound of section 4, {coupling}"
 
+    # fields and their interpolants alone: what is tested is the reading of (4.3), not the core
     def order(name: str, proves: str, owed: float) -> Line:
         found, _ = least_squares([row["h"] for row in rows], [row[name] for row in rows])
         return line.near(f"{case}, order of {name}", proves, "theory", owed, found, BAND, scale=1.0)

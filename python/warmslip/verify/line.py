@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-Origin = Literal["analytic", "manufactured", "independent code", "identity", "theory", "regression"]
+Origin = Literal["analytic", "manufactured", "independent code", "identity", "theory", "comparison", "own rule"]
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def unchanged(folder: Path) -> list[Line]:
 
 
 def audited(folder: Path) -> list[Line]:
-    """What the audit says of the paper's data sets, against runs that could contradict it."""
+    """What the audit of the paper's data sets claims, put to runs; no order of |w|_L2, as none can be seen on these grids."""
     return [line for reading in READINGS for line in audit_runs.lines(reading)]
 
 

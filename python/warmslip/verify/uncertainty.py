@@ -132,5 +132,5 @@ def lines(study: Path) -> list[Line]:
         found = extrapolate([r["h"] for r in rows[:-1]], [r[name] for r in rows[:-1]])
         low, high = found.value - found.uncertainty, found.value + found.uncertainty
         what = f"the interval of h = 1/{rows[-2]['n']} holds the value of h = 1/{rows[-1]['n']}"
-        out.append(Line(f"{study.stem} {name}", what, "theory", found.value, rows[-1][name], low, high))
+        out.append(Line(f"{study.stem} {name}", what, "comparison", found.value, rows[-1][name], low, high))
     return out

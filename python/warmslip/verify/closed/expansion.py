@@ -68,10 +68,10 @@ def _pressed(stiffness: float) -> list[Line]:
             below(
                 name, "c_nu (u_nu - g) is p but for the floor, twice", "analytic", miss, bench.ROUND_OFF + 2 * stated
             ),
-            near(name, "the floor it states is that one", "analytic", stated, report.ledger.law_floor, 1e-3),
+            near(name, "the floor it states is that one", "own rule", stated, report.ledger.law_floor, 1e-3),
         ]
     must, lost = float(stated > DECLARED), float(job.outcome == "precision_lost")
-    return [*lines, Line(name, "precision_lost where it is, and only there", "analytic", must, lost, must, must)]
+    return [*lines, Line(name, "precision_lost where it is, and only there", "own rule", must, lost, must, must)]
 
 
 def heated_column() -> list[Line]:
