@@ -258,6 +258,7 @@ def draw(
 
 
 app.command()(cli_verify.check)
+app.command()(cli_verify.explain)
 app.command()(cli_verify.verify)
 app.command()(cli_verify.report)
 

@@ -35,6 +35,22 @@ def check(
             audit_report.write(out, found, studies.stamp(checked))
 
 
+def explain(
+    scene: SceneName,
+    set_: Set = None,
+    trial: Annotated[bool, typer.Option(help="set up and take a few steps to tell the cost")] = True,
+) -> None:
+    """Say what a scene will do and cost before it runs: fields, operators, solver, what could be left out, what is missing."""
+    from mpi4py import MPI
+
+    from warmslip import explain as plans
+
+    checked = scenes.load(scene, set_)
+    found = plans.measured(checked) if trial else plans.plan(checked)
+    if MPI.COMM_WORLD.rank == 0:
+        typer.echo(plans.text(found))
+
+
 def verify(
     topic: Annotated[str, typer.Argument(help="a topic of the report, or `list`")],
     out: Annotated[Path, typer.Option(help="the CSV of lines to write; tables and stamp go beside it")] = Path(

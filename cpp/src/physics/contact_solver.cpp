@@ -29,8 +29,10 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
                    free = problem.free.template segment<d>(at);
     const double r = point.penetration + problem.step * w.dot(point.normal);
-    largest = std::max({largest, f.norm(), point.weight * law.compliance.pressure(r)});
-    widest = std::max(widest, point.weight * law.bound(r, (w - w.dot(point.normal) * point.normal).norm()).value);
+    const double speed = (w - w.dot(point.normal) * point.normal).norm();
+    largest = std::max({largest, f.norm(), point.weight * law.compliance.pressure(r),
+                        point.weight * law.friction.bound(0, speed).value});  // the last: borne without pressure
+    widest = std::max(widest, point.weight * law.bound(r, speed).value);
     fastest = std::max({fastest, free.norm(), w.norm()});
     // the velocity is what the contact force leaves of the free one
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
@@ -39,7 +41,6 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
         4 * eps * terms;  // what rounding makes of r; a point that is open all the same has no part in it
     if (r > -blur) rounding = std::max(rounding, point.weight * law.compliance.tangent(std::max(r, 0.0) + blur) * blur);
   }
-  largest = std::max(largest, widest);  // friction that needs no pressure
   *floor = std::numeric_limits<double>::infinity();
   if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))
     return std::numeric_limits<double>::infinity();

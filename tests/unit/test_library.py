@@ -1,0 +1,147 @@
+"""The scenes of the library: each runs from its file and from Python to the same numbers, and says beforehand what it does."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Command
+
+import warmslip
+from warmslip import explain
+from warmslip.scene import library
+
+# one number of each, regression: norm of the last state, or what its essay promises
+PINNED = {
+    "heat_slab": ("theta_L2", 4.590521916),
+    "quasistatic_punch": ("u_V", 0.0128852955),
+    "elastic_drop": ("w_L2", 0.9097956351),
+    "sliding_block": ("theta_L2", 0.1813131821),
+    "brake_pad": ("theta_L2", 1.026810617),
+    "two_materials": ("u_V", 0.06233801862),
+    "plate_with_hole": ("theta_L2", 2.363267372),
+    "block_with_hole": ("u_V", 0.088526593),
+}
+LARGE = {"paper_printed", "paper_mixed", "paper_isotropic", "paper_consistent", "block_3d"}  # the studies run them
+
+
+def test_every_scene_has_its_number() -> None:
+    assert set(library()) == set(PINNED) | LARGE
+
+
+@pytest.mark.parametrize("name", PINNED)
+def test_a_scene_from_its_file_and_from_python(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = Path(str(resources.files("warmslip") / "scenes"))
+    result = warmslip.run(warmslip.load(name))
+    assert result.outcome == "right"
+    norm, value = PINNED[name]
+    assert result.summary["norms"][norm] == pytest.approx(value, rel=2e-9)
+    for file in (*folder.glob("*.msh"), folder / f"{name}.toml"):  # elsewhere, the mesh beside it
+        shutil.copy(file, tmp_path)
+    monkeypatch.chdir(tmp_path.parent)
+    again = warmslip.run(warmslip.load(tmp_path / f"{name}.toml"))
+    assert again.summary["norms"] == result.summary["norms"]
+
+
+def test_the_thrown_block_stops_where_coulomb_says() -> None:
+    """V^2/(2 mu g) on, with half of its energy in it as heat but for what damping takes."""
+    result = warmslip.run(warmslip.load("sliding_block"))
+    assert result.u[:, 0].mean() == pytest.approx(1 / (2 * 0.2 * 10), rel=2e-2)
+    assert np.abs(result.w[:, 0]).max() < 1e-4
+
+
+def test_the_dropped_block_jumps_up_again() -> None:
+    """Without friction and viscosity nearly all of its speed comes back."""
+    result = warmslip.run(warmslip.load("elastic_drop"))
+    assert 0.9 < result.w[:, 1].mean() < 1
+
+
+@pytest.mark.parametrize("name", library())
+def test_a_plan_needs_no_run(name: str) -> None:
+    scene = warmslip.load(name)
+    found = explain.plan(scene)
+    assert found.fields
+    assert found.every_step
+    assert found.removable == {}  # the library carries nothing that does nothing
+    assert explain.pruned(scene) == scene
+    said = explain.text(found)
+    assert ("no viscosity" in said) == (scene.moves and scene.viscosity is None)
+    assert ("displacement" in said) == scene.moves
+
+
+IDLE: dict[str, dict[str, Any]] = {
+    "contact.friction": {"contact.friction.coefficient": 0.0},
+    "contact.heat_exchange": {"contact.heat_exchange.conductance": 0.0},
+    "heat.heating": {"heat.heating.tensor": 0.0},
+    "heat.expansion": {"heat.expansion.tensor": [[0.0, 0.0], [0.0, 0.0]]},
+    "elasticity": {"elasticity": {"lame": [0.0, 0.0]}},
+    "viscosity": {"viscosity": {"young": 0.0, "poisson": 0.1, "assumption": "plane_stress"}},
+    "inertia": {"inertia.density": 0.0},
+    "loads.body": {"loads.body": [0.0, 0.0]},
+    "loads.traction.left": {"loads.traction.left": [0.0, 0.0]},
+    "loads.heat_flux.left": {"loads.heat_flux": {"left": 0.0}, "supports.temperature": ["top"]},
+    "contact": {"contact": {"part": "bottom", "stiffness": 0.0}},
+    "heat": {
+        "heat": {"conductivity": 1.0, "expansion": {"tensor": 1.0}},
+        "contact.heat_exchange.foundation_temperature": 0.0,
+    },
+}
+
+
+@pytest.mark.parametrize("key", IDLE)
+def test_what_can_be_left_out_changes_nothing(key: str) -> None:
+    values = {"mesh.n": 6, "time.steps": 4, "contact.heat_exchange.foundation_temperature": 10.0} | IDLE[key]
+    scene = warmslip.load("paper_isotropic").override(**values)
+    assert key in explain.removable(scene)
+    smaller = explain.pruned(scene)
+    assert smaller != scene
+    full, less = warmslip.run(scene), warmslip.run(smaller)
+    assert full.outcome == less.outcome == "right"
+    for name in ("u", "w", "theta"):
+        one, other = getattr(less, name), getattr(full, name)
+        assert one is not None or np.abs(other).max() == 0
+        if one is not None:
+            assert np.abs(one - other).max() <= 1e-12 * max(1e-300, np.abs(other).max())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"contact.heat_exchange.foundation_temperature": "0 * t"},
+        {"heat.source": 1.0},
+        {"initial.temperature": 1.0},
+        {"contact.friction": {"coefficient": 0.2}, "contact.friction_heating": {"share": 0.1}},
+        {"heat.heating": {"tensor": 1.0}},
+    ],
+)
+def test_heat_that_may_be_there_is_not_left_out(change: dict[str, Any]) -> None:
+    cold = {"heat": {"conductivity": 1.0}, "contact.heat_exchange.foundation_temperature": 0.0}
+    scene = warmslip.load("paper_isotropic").override(**cold)
+    assert "heat" in explain.removable(scene)
+    assert "heat" not in explain.removable(scene.override(**change))
+
+
+def test_the_command_says_what_it_costs(command: Command) -> None:
+    told = command("explain", "paper_mixed", "--set", "mesh.n=8").stdout
+    assert "CHOLMOD" in told
+    assert "243 unknowns, 9 contact points" in told
+    assert "ms a step" in told
+    assert "contact on 'bottom': whether it touches is known only by running" in told
+    assert "cost here" not in command("explain", "heat_slab", "--no-trial").stdout
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["plate_with_hole", "block_with_hole", "brake_pad", "heat_slab"])
+def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, name: str) -> None:
+    summaries = []
+    for ranks in (1, 2):
+        result = command("run", name, "--out", f"run{ranks}", ranks=ranks)
+        assert result.returncode == 0, result.stderr
+        summaries.append(json.loads((tmp_path / f"run{ranks}/summary.json").read_text()))
+    assert summaries[1]["norms"] == pytest.approx(summaries[0]["norms"], rel=1e-9)
+    assert summaries[1]["contact"]["normal_force"] == pytest.approx(summaries[0]["contact"]["normal_force"], rel=1e-9)
