@@ -99,6 +99,20 @@ def _told(summary: dict[str, Any]) -> str:
 
 
 @app.command()
+def export(
+    run: Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")],
+    out: Annotated[Path, typer.Option(help="folder for body.pvd, contact.pvd and series.csv")],
+) -> None:
+    """Write a stored run as a series that ParaView opens, and its resultants and ledger as CSV."""
+    from warmslip import export as series
+
+    with _bar() as bar:
+        task = bar.add_task("writing", total=None, note="")
+        count, _ = series.export(run, out, progress=lambda n, total: bar.update(task, completed=n, total=total))
+    typer.echo(f"{count} states in {out}/body.pvd, contact points in contact.pvd, time series in series.csv")
+
+
+@app.command()
 def study(
     scene: SceneName,
     out: Csv,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from typing import Annotated, Any
 
 import numexpr
@@ -99,8 +100,12 @@ class Expression:
         self.text = text
         if len(text) > LONGEST:
             raise ValueError(f"a formula of {len(text)} characters; at most {LONGEST} are read")
+        if "\0" in text:
+            raise ValueError("a formula has no null bytes; remove them")
         try:
-            tree = ast.parse(text.strip(), mode="eval")
+            with warnings.catch_warnings():  # Python has advice on its own syntax
+                warnings.simplefilter("ignore")
+                tree = ast.parse(text.strip(), mode="eval")
             for node in ast.walk(tree):
                 if problem := _problem(node):
                     raise ValueError(f"in '{text}': {problem}")

@@ -84,7 +84,8 @@ class MeshTable(Table):
     @model_validator(mode="after")
     def _sizes(self) -> Self:
         if self.file is not None:
-            given = sorted(self.model_fields_set - {"file"})
+            fields = type(self).model_fields
+            given = [key for key in fields if key != "file" and getattr(self, key) != fields[key].default]
             if given:
                 raise ValueError(f"a mesh from a file has no {', '.join(given)}; remove that, or the file")
             mesh_files.read(self.file)  # refuses
