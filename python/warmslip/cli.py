@@ -64,6 +64,7 @@ def run(
     out: Annotated[Path, typer.Option(help="folder for trajectory.h5 and summary.json")],
     set_: Set = None,
     backend: Annotated[str, typer.Option(help="automatic, cholmod or petsc")] = "automatic",
+    resume: Annotated[bool, typer.Option("--resume", help="go on from the newest checkpoint in the folder")] = False,
 ) -> None:
     """Run a scene. Exit code 0 when the outcome is right, 1 when it is not, 2 when the scene cannot be run."""
     import warmslip
@@ -80,7 +81,7 @@ def run(
         def progress(step: int, steps: int, report: Any) -> None:
             bar.update(task, completed=step, note=f"open {report.open} stick {report.stick} slip {report.slip}")
 
-        result = warmslip.run(checked, out=out, backend=backend, progress=progress)
+        result = warmslip.run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if rank == 0:
         typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
     if not result.right:

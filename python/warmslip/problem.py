@@ -188,6 +188,10 @@ class Discretisation:
                 w[nodes] = 0
         for nodes, values in self.load_vectors.held(1, time).values():
             theta[nodes] = values[:, 0]
+        return self.state(stepper, u, w, theta, time)
+
+    def state(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
+        """Sets the state as it is given, see `restart`."""
         vectors: list[Any] = [None, None, None]
         for i, (there, values) in enumerate(
             ((self.problem.moves, u), (self.problem.moves, w), (self.problem.conducts, theta))

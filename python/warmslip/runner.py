@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import _core, mesh_io, provenance
+from warmslip import _core, checkpoint, mesh_io, provenance
 from warmslip.loads import Loads
 from warmslip.problem import Discretisation, discretise
 from warmslip.scene import Scene
@@ -77,13 +77,24 @@ class Run:
         self.floors = dict.fromkeys(FLOORS, 0.0)
         self.outcome = "right"
         self.report: Any = None
+        self._resumed = 0  # steps of an earlier process
         self.newton_max = 0
         self.stages: dict[str, int] = {}
         self.failure: dict[str, Any] | None = None
 
+    @property
+    def taken(self) -> int:
+        """Steps so far, those of an earlier process that this one goes on from included."""
+        return self._resumed + int(self.stepper.cost.steps)
+
+    def resume(self, folder: Path) -> int:
+        """Goes on from the newest checkpoint in `folder`, see `checkpoint.load`; the step it goes on from (collective)."""
+        self._resumed = checkpoint.load(folder, self)
+        return self._resumed
+
     def steps(self) -> Iterator[Any]:
         """Advances to the end, yielding a report a step; stops before a step that is not right, whose state is not kept."""
-        for n in range(1, self.scene.time.steps + 1):
+        for n in range(self.taken + 1, self.scene.time.steps + 1):
             report = self.stepper.advance(*self.discretisation.load_vectors.at(n * self.scene.step))
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
@@ -120,7 +131,7 @@ class Run:
             "outcome": self.outcome,
             "failure": self.failure,
             "time": s.time,
-            "steps": cost.steps,
+            "steps": self.taken,
             "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
             | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
             "contact": contact | counts | {"traction": traction},
@@ -160,8 +171,12 @@ def run(
     loads: Loads | None = None,
     backend: str = "automatic",
     progress: Callable[[int, int, Any], None] | None = None,
+    resume: bool = False,
 ) -> Result:
-    """Runs a scene. With `out`, writes trajectory.h5, summary.json and final.vtu there.
+    """Runs a scene. With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs.
+
+    With `resume`, goes on from the newest whole checkpoint in `out`, to the same end bit by bit as the run that was not
+    stopped; without one it starts from the beginning. Custom `loads` must be the same, which nobody checks.
 
     Collective over `comm` (default: all ranks). `progress(step, steps, report)` is called after every step on rank 0.
     A run that cannot go on returns normally: see `Result.outcome`, one of right, contact_not_converged, not_finite,
@@ -171,16 +186,23 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in ("summary.json", "final.vtu"):  # they would speak of another run
+        stale = () if resume else checkpoint.NAMES
+        for name in ("summary.json", "final.vtu", *stale):  # they would speak of another run
             (folder / name).unlink(missing_ok=True)
     job = Run(scene, comm=comm, loads=loads, backend=backend)
     rank = job.comm.rank
     path = folder / "trajectory.h5" if folder is not None else None
-    with TrajectoryWriter(path, job.discretisation, job.stepper, job.comm) as writer:
+    begin = job.resume(folder) if resume and folder is not None else 0
+    with TrajectoryWriter(path, job.discretisation, job.stepper, job.comm, keep=begin) as writer:
         for report in job.steps():
-            writer.step(report)
+            writer.step(report, job.taken)
+            if folder is not None and job.taken % scene.output.checkpoint == 0 and job.taken < scene.time.steps:
+                checkpoint.save(folder, job)
             if progress and rank == 0:
-                progress(job.stepper.cost.steps, scene.time.steps, report)
+                progress(job.taken, scene.time.steps, report)
+    if folder is not None and rank == 0:
+        for name in checkpoint.NAMES:  # the run is over
+            (folder / name).unlink(missing_ok=True)
     summary = job.summary()
     u, w, theta = (job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta"))
     if folder is not None and rank == 0:

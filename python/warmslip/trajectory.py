@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -25,8 +26,11 @@ class TrajectoryWriter:
     collective, rank 0 alone writes; without a path nothing is written.
     """
 
-    def __init__(self, path: Path | None, discretisation: Discretisation, stepper: Any, comm: Any) -> None:
-        self._d, self._stepper = discretisation, stepper
+    def __init__(
+        self, path: Path | None, discretisation: Discretisation, stepper: Any, comm: Any, *, keep: int = 0
+    ) -> None:
+        """`keep` steps of the file that is there are kept, of a run that is resumed."""
+        self._d, self._stepper, self._taken = discretisation, stepper, keep
         self._file: h5py.File | None = None
         self._writing, self._stored = path is not None, -1
         self._alone = comm.size == 1
@@ -35,7 +39,12 @@ class TrajectoryWriter:
             return
         d, points = discretisation.dim, len(discretisation.surface.weights)
         nodes = len(discretisation.mesh.nodes)
-        file = self._file = h5py.File(path, "w")
+        earlier = path.with_suffix(".earlier.h5")
+        if not keep:
+            earlier.unlink(missing_ok=True)
+        elif not earlier.exists():  # else a resumed run was killed while it copied
+            os.replace(path, earlier)
+        file = self._file = h5py.File(path, "w", libver="latest")
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
         file["mesh/nodes"] = discretisation.mesh.nodes
         file["mesh/cells"] = discretisation.mesh.cells
@@ -64,6 +73,10 @@ class TrajectoryWriter:
             table("contact/force", points, d)
             table("contact/displacement", points, d)
             table("contact/status", points, dtype="i1")
+        if keep:
+            self._copy(earlier, keep)
+            self._stored = keep if keep % discretisation.scene.output.every == 0 else -1
+        file.swmr_mode = True  # readable to the last flush, also when the process is killed
 
     def _append(self, name: str, value: Any) -> None:
         assert self._file is not None
@@ -73,7 +86,7 @@ class TrajectoryWriter:
 
     def _state(self) -> None:
         stepper = self._stepper
-        self._stored = stepper.cost.steps
+        self._stored = self._taken
         fields = {name: self._d.field(getattr(stepper, name)) for name in self._fields}
         if self._file is None:
             return
@@ -82,9 +95,39 @@ class TrajectoryWriter:
             self._append(f"states/{name}", values)
         self._file.flush()
 
-    def step(self, report: Any) -> None:
+    def _copy(self, earlier: Path, keep: int) -> None:
+        """Takes over the first `keep` steps and the states up to them."""
+        assert self._file is not None
+        # a killed writer leaves its mark, which this way of reading looks past
+        with h5py.File(earlier, "r", libver="latest", swmr=True) as file:
+            every = self._d.scene.output.every
+            reached = np.rint(np.asarray(file["states/time"]) / self._d.scene.step).astype(int)
+            due = np.flatnonzero(
+                (reached <= keep) & (reached % every == 0)
+            )  # not the last one of a run that was stopped
+            for name in self._file["states"]:
+                self._take(file, f"states/{name}", due)
+            for group in ("steps", "ledger"):
+                for name in self._file[group]:
+                    self._take(file, f"{group}/{name}", np.arange(keep))
+            for name in ("force", "displacement", "status"):
+                if f"contact/{name}" in self._file:
+                    self._take(file, f"contact/{name}", np.arange(keep))
+        earlier.unlink()
+
+    def _take(self, file: Any, name: str, rows: Any) -> None:
+        assert self._file is not None
+        if len(file[name]) < len(rows):
+            raise ValueError(
+                f"the trajectory ends before the checkpoint ({name}); run from the start, without --resume"
+            )
+        self._file[name].resize(len(rows), axis=0)
+        self._file[name][:] = file[name][rows]
+
+    def step(self, report: Any, taken: int) -> None:
         """Appends the report, the ledger and the contact points of the step just taken, and its state when due (collective)."""
         stepper, scene = self._stepper, self._d.scene
+        self._taken = taken
         if self._file is not None:
             self._append("steps/time", stepper.time)
             for name in REPORT:
@@ -98,11 +141,11 @@ class TrajectoryWriter:
                 self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
                 self._append("contact/status", stepper.status)
             self._file.flush()
-        if self._writing and stepper.cost.steps % scene.output.every == 0:
+        if self._writing and taken % scene.output.every == 0:
             self._state()
 
     def __enter__(self) -> Self:
-        if self._writing:
+        if self._writing and self._taken == 0:
             self._state()
         return self
 
@@ -111,10 +154,13 @@ class TrajectoryWriter:
     ) -> None:
         # after an error on one of many ranks the others are elsewhere, and gathering would wait for them
         if self._writing and (kind is None or self._alone):
-            if self._stored != self._stepper.cost.steps:
+            if self._stored != self._taken:
                 self._state()
             mises = self._d.mises(self._stepper) if self._d.problem.moves else None
             if self._file is not None and mises is not None:
+                path = self._file.filename
+                self._file.close()
+                self._file = h5py.File(path, "r+")
                 self._file["fields/mises"] = mises
         if self._file is not None:
             self._file.close()

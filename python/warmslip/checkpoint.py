@@ -1,0 +1,103 @@
+"""Checkpoints: the state of a run after a step, from which the next steps come out the same to the last bit.
+
+Two files are kept, the newest and the one before; each is written beside them and then renamed, so that a process that is
+killed leaves at least one whole. What a checkpoint belongs to (scene, mesh, code, linear algebra) is written into it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warmslip import provenance
+
+if TYPE_CHECKING:
+    from warmslip.runner import Run
+
+NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
+FIELDS = ("u", "w", "theta")
+
+
+def _owner(job: Run) -> dict[str, Any]:
+    """What must be the same for the same next step."""
+    return {
+        "scene": job.scene.digest(),
+        "fingerprint": provenance.fingerprint(),
+        "solver": job.stepper.solver,
+        "ranks": job.comm.size,
+    }
+
+
+def save(folder: Path, job: Run) -> None:
+    """Writes the state after the last step; the stepper forgets what a resumed one cannot know (collective)."""
+    stepper = job.stepper
+    stepper.forget()
+    fields = {name: job.discretisation.field(getattr(stepper, name)) for name in FIELDS}
+    if job.comm.rank != 0:
+        return
+    record = {
+        "owner": _owner(job),
+        "step": job.taken,
+        "time": float(stepper.time).hex(),
+        "worst": job.worst,
+        "floors": job.floors,
+        "newton_max": job.newton_max,
+        "stages": job.stages,
+    }
+    arrays = {name: values for name, values in fields.items() if values is not None}
+    arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
+    newest, previous = (folder / name for name in NAMES)
+    written = folder / "checkpoint.part.npz"
+    np.savez(written, record=np.array(json.dumps(record)), **arrays)
+    if newest.exists():
+        os.replace(newest, previous)
+    os.replace(written, newest)
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """Record and arrays of a whole checkpoint, None for a torn one."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: np.array(file[name]) for name in file.files}
+        record = json.loads(str(arrays.pop("record")))
+        return record, arrays
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def load(folder: Path, job: Run) -> int:
+    """Brings a new run to the newest whole checkpoint of its own in `folder`; the step it goes on from, 0 if there is none.
+
+    Collective. Raises ValueError when the only whole checkpoints belong to another scene, code or number of ranks.
+    """
+    found: tuple[dict[str, Any], dict[str, Any]] | None = None
+    foreign = ""
+    if job.comm.rank == 0:
+        for name in NAMES:
+            whole = _read(folder / name)
+            if whole is None:
+                continue
+            other = [key for key, value in _owner(job).items() if whole[0]["owner"].get(key) != value]
+            if not other:
+                found = whole
+                break
+            foreign = f"{folder / name} is of another {' and '.join(other)}"
+    found, foreign = job.comm.bcast((found, foreign), root=0)
+    if found is None:
+        if foreign:
+            raise ValueError(f"{foreign}; run it as it was, or without --resume from the start")
+        return 0
+    record, arrays = found
+    nodes = len(job.discretisation.mesh.nodes)
+    u, w, theta = (arrays.get(name, np.zeros((nodes, 1))) for name in FIELDS)
+    job.discretisation.state(job.stepper, u, w, theta, float.fromhex(record["time"]))
+    job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
+    job.worst, job.floors = record["worst"], record["floors"]
+    job.newton_max, job.stages = record["newton_max"], record["stages"]
+    return int(record["step"])

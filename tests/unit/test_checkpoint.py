@@ -1,0 +1,151 @@
+"""A run that is killed and resumed ends as one that was not, bit by bit; torn and foreign checkpoints are told apart."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from conftest import Command, child_environment
+
+import warmslip
+from warmslip import Scene, checkpoint, load
+from warmslip.runner import Run
+
+KEYS = ["mesh.n=8", "time.steps=24", "output.every=7", "output.checkpoint=5"]
+
+
+def scene(*more: str) -> Scene:
+    return load("paper_mixed", [*KEYS, "contact.heat_exchange.foundation_temperature=10.0", *more])
+
+
+def contents(path: Path) -> dict[str, np.ndarray]:
+    found = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def same(one: Path, other: Path) -> None:
+    first, second = contents(one / "trajectory.h5"), contents(other / "trajectory.h5")
+    assert first.keys() == second.keys()
+    for name, values in first.items():
+        assert np.array_equal(values, second[name]), name
+
+
+class KilledError(Exception):
+    pass
+
+
+def stop_after(steps: int) -> Callable[[int, int, object], None]:
+    def progress(step: int, _: int, __: object) -> None:
+        if step == steps:
+            raise KilledError
+
+    return progress
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        (),
+        ("time.coupling=monolithic",),
+        ("contact.quadrature=gauss-2",),
+        ("contact.friction.kinetic=0.1", "contact.friction.speed=0.5", "loads.body=['t', '-cos(t)']"),
+    ],
+    ids=["plain", "monolithic", "Gauss", "weakening under moving loads"],
+)
+@pytest.mark.parametrize("steps", [3, 5, 23])
+def test_a_resumed_run_ends_the_same(tmp_path: Path, more: tuple[str, ...], steps: int) -> None:
+    whole = warmslip.run(scene(*more), out=tmp_path / "whole")
+    with pytest.raises(KilledError):
+        warmslip.run(scene(*more), out=tmp_path / "torn", progress=stop_after(steps))
+    taken: list[int] = []
+    again = warmslip.run(scene(*more), out=tmp_path / "torn", resume=True, progress=lambda step, *_: taken.append(step))
+    assert taken[0] == steps // 5 * 5 + 1
+    assert again.outcome == "right"
+    for name in ("u", "w", "theta"):
+        assert np.array_equal(getattr(whole, name), getattr(again, name))
+    assert again.summary["identities"] == whole.summary["identities"]
+    assert again.summary["steps"] == 24
+    same(tmp_path / "whole", tmp_path / "torn")
+    assert not any((tmp_path / "torn" / name).exists() for name in checkpoint.NAMES)
+
+
+def test_a_torn_checkpoint_is_passed_over_for_the_one_before(tmp_path: Path) -> None:
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, progress=stop_after(13))
+    newest, previous = (tmp_path / name for name in checkpoint.NAMES)
+    whole = newest.read_bytes()
+    job = Run(scene())
+    assert job.resume(tmp_path) == 10
+    for spoiled in (whole[: len(whole) // 2], whole[:-200] + bytes(200), b"", whole[:900] + b"x" + whole[901:]):
+        newest.write_bytes(spoiled)
+        assert Run(scene()).resume(tmp_path) == 5
+    previous.write_bytes(b"nothing")
+    assert Run(scene()).resume(tmp_path) == 0  # from the start
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, progress=stop_after(7))
+    with pytest.raises(ValueError, match="is of another scene; run it as it was"):
+        warmslip.run(scene("inertia.density=2.0"), out=tmp_path, resume=True)
+    shutil.copy(tmp_path / checkpoint.NAMES[0], tmp_path / checkpoint.NAMES[1])
+    (tmp_path / checkpoint.NAMES[0]).write_bytes(b"torn")
+    assert Run(scene()).resume(tmp_path) == 5
+
+
+def killed(folder: Path, seconds: float) -> bool:
+    """Starts or goes on with the run and kills it after some time; whether it was over before."""
+    words = [word for key in [*KEYS, "mesh.n=24", "time.steps=300"] for word in ("--set", key)]
+    program = str(Path(sys.executable).parent / "warmslip")
+    process = subprocess.Popen(
+        [program, "run", "paper_mixed", *words, "--out", str(folder), "--resume"],
+        env=child_environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    try:
+        _, errors = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        os.kill(process.pid, signal.SIGKILL)
+        process.communicate()
+        return False
+    assert process.returncode == 0, errors.decode()
+    return True
+
+
+def kill_at_random(folder: Path, times: int, seed: int = 1) -> None:
+    """Kills a run `times` times at random moments and resumes it each time, against the run that was left alone."""
+    begin = time.perf_counter()
+    assert killed(folder / "whole", 600.0)
+    length = time.perf_counter() - begin
+    moments, count = random.Random(seed), 0
+    while count < times:
+        torn = folder / f"torn{count}"
+        while not killed(torn, moments.uniform(0.3, 0.7) * length):
+            count += 1
+        same(folder / "whole", torn)
+        count += 1
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments(tmp_path: Path) -> None:
+    kill_at_random(tmp_path, int(os.environ.get("WARMSLIP_KILLS", "6")))
+
+
+def test_resume_by_command(command: Command, tmp_path: Path) -> None:
+    command("run", "heat_slab", "--out", "one")
+    again = command("run", "heat_slab", "--out", "two", "--resume")  # nothing to go on from
+    assert again.returncode == 0, again.stderr
+    same(tmp_path / "one", tmp_path / "two")
