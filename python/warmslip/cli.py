@@ -117,8 +117,10 @@ def export(
 def study(
     scene: SceneName,
     out: Csv,
-    levels: Annotated[str, typer.Option(help="1/h and 1/k of the members")] = "16,32,64,128",
-    reference: Annotated[int, typer.Option(help="1/h = 1/k of the solution taken as exact")] = 256,
+    levels: Annotated[
+        str, typer.Option(help="bricks along the first axis, and steps, of the members")
+    ] = "16,32,64,128",
+    reference: Annotated[int, typer.Option(help="bricks and steps of the solution taken as exact")] = 256,
     grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
     set_: Set = None,
 ) -> None:

@@ -98,8 +98,9 @@ def _sizes(scene: Scene) -> Iterator[str]:
         yield "initial.temperature: initial data cannot depend on t; leave it out"
 
 
-def _heats(scene: Scene) -> list[tuple[str, t.HeatTable]]:
-    tables = [("heat", scene.heat), *((f"regions.{name}.heat", region.heat) for name, region in scene.regions.items())]
+def _heats(scene: Scene) -> list[tuple[str, t.HeatTable | t.RegionHeatTable]]:
+    tables: list[tuple[str, t.HeatTable | t.RegionHeatTable | None]] = [("heat", scene.heat)]
+    tables += [(f"regions.{name}.heat", region.heat) for name, region in scene.regions.items()]
     return [(key, table) for key, table in tables if table is not None]
 
 
@@ -209,7 +210,10 @@ def _regions(scene: Scene) -> Iterator[str]:
             yield f"regions.{name}: unknown region; {has}, or say `where` with a formula of x, y, z"
         if region.where is not None:
             try:
-                if Expression(region.where).of_time:
+                where = Expression(region.where)
+                if not where.condition:
+                    yield f"regions.{name}.where: '{region.where}' is no condition; compare, as in x < 0.5"
+                if where.of_time:
                     yield f"regions.{name}.where: a region cannot depend on t; leave it out"
             except ValueError as error:
                 yield f"regions.{name}.where: {error}"
@@ -220,8 +224,6 @@ def _regions(scene: Scene) -> Iterator[str]:
             for key in ("expansion", "heating"):
                 if getattr(region.heat, key) is not None and getattr(scene.heat, key) is None:
                     yield f"regions.{name}.heat.{key}: the body has no table [heat.{key}]; give one for the rest of it"
-            if "source" in region.heat.model_fields_set:
-                yield f"regions.{name}.heat.source: a source is given once, as a formula of x, y, z; move it to [heat]"
 
 
 def _time(scene: Scene) -> Iterator[str]:

@@ -191,6 +191,16 @@ def _missing(scene: Scene) -> list[str]:
         out.append("no viscosity: only backward Euler damps the motion, the more the longer the step")
     if scene.moves and scene.inertia is None:
         out.append("no inertia: every step is in equilibrium")
+    for c in scene.contacts:
+        if c.friction is not None and c.friction.cohesion:
+            out.append(f"friction on '{c.part}' has a cohesion, which acts also where there is no pressure")
+    if (
+        scene.initial.velocity is not None
+        and scene.moves
+        and scene.inertia is None
+        and not _zero(scene.initial.velocity)
+    ):
+        out.append("the initial velocity moves nothing: there is no inertia")
     leads = any(c.heat_exchange is not None for c in scene.contacts)
     if scene.heat is not None and not scene.supports.temperature and not leads:
         out.append("no support holds a temperature and no foundation takes heat: what is supplied stays in the body")

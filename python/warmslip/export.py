@@ -28,6 +28,8 @@ def export(
     contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status;
     series.csv: resultants and ledger of every step. Raises OSError for what is no run or cannot be written.
     """
+    if not (Path(run) / "trajectory.h5").exists():
+        raise ValueError(f"'{run}' holds no trajectory.h5; give the folder that `warmslip run` wrote")
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with Trajectory(Path(run) / "trajectory.h5") as t:

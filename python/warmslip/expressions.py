@@ -70,6 +70,10 @@ class _Numexpr(ast.NodeTransformer):
 
 def _problem(node: ast.AST) -> str:
     """What a formula must not hold, in words, or nothing."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+        return "'^' is no power; write x ** 2"
+    if isinstance(node, ast.IfExp):
+        return "write where(condition, one, other) in place of if and else"
     if not isinstance(node, NODES):
         return f"'{ast.unparse(node)}' is no part of a formula"
     if isinstance(node, ast.Name) and node.id not in (*VARIABLES, "pi", *FUNCTIONS):
@@ -113,7 +117,8 @@ class Expression:
             self._numexpr = ast.unparse(ast.fix_missing_locations(_Numexpr().visit(tree)))
         except (SyntaxError, RecursionError, MemoryError, OverflowError) as error:
             raise ValueError(f"'{text}' is not a formula ({getattr(error, 'msg', None) or error})") from None
-        self(np.full((1, 3), 0.5), 0.5)  # types are wrong here or nowhere
+        # types are wrong here or nowhere
+        self.condition = self._evaluate(np.full((1, 3), 0.5), 0.5).dtype == bool
 
     @property
     def of_time(self) -> bool:
@@ -124,6 +129,9 @@ class Expression:
 
         Raises ValueError when it cannot be evaluated; what is not finite is for the caller to refuse.
         """
+        return np.array(np.broadcast_to(self._evaluate(x, t), (len(x),)), dtype=float)
+
+    def _evaluate(self, x: NDArray[np.float64], t: float) -> NDArray[Any]:
         columns = [np.ascontiguousarray(x[:, i]) if i < x.shape[1] else np.zeros(len(x)) for i in range(3)]
         known = dict(zip(VARIABLES, (*columns, float(t)), strict=True))
         try:
@@ -131,7 +139,7 @@ class Expression:
                 value = numexpr.evaluate(self._numexpr, local_dict=known, global_dict={}, sanitize=False)
         except Exception as error:  # numexpr raises what it likes
             raise ValueError(f"'{self.text}' cannot be evaluated ({error})") from None
-        return np.array(np.broadcast_to(value, (len(x),)), dtype=float)
+        return np.asarray(value)
 
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"

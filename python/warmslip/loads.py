@@ -14,6 +14,7 @@ from warmslip.expressions import Expression, constant
 from warmslip.scene import Scene
 
 Array = NDArray[np.float64]
+HEATED = "contact.heat_exchange.foundation_temperature"
 # constants, or functions of positions (points, d) and time returning (points,) or (points, d)
 Data = Any
 
@@ -94,17 +95,20 @@ class Loads:
         return value[number] if isinstance(value, list) else value
 
 
-def evaluate(data: Data, x: Array, t: float, components: int) -> Array:
-    """Values of `data` at positions x (points, d), as (points, components). Raises ValueError when not finite or misshaped."""
+def evaluate(data: Data, x: Array, t: float, components: int, what: str = "a load") -> Array:
+    """Values of `data` at positions x (points, d), as (points, components). Raises ValueError when not finite or misshaped.
+
+    `what` is what the message calls it.
+    """
     value = np.asarray(data(x, t) if callable(data) else data, dtype=float)
     if value.ndim < 2 and components == 1 and value.shape in ((), (len(x),)):
         value = np.broadcast_to(value, (len(x),))[:, None]
     elif value.ndim < 2:
         value = np.broadcast_to(value, (len(x), components))
     if value.shape != (len(x), components):
-        raise ValueError(f"a load must give shape {(len(x), components)} at {len(x)} points, got {value.shape}")
+        raise ValueError(f"{what} must give shape {(len(x), components)} at {len(x)} points, got {value.shape}")
     if not np.isfinite(value).all():
-        raise ValueError(f"a load is not finite at t = {t:g}; check its expression")
+        raise ValueError(f"{what} is not finite at t = {t:g}; check its expression")
     return np.ascontiguousarray(value)
 
 
@@ -146,27 +150,27 @@ class LoadVectors:
         contacts = [(c.part, c.heat_exchange.conductance if c.heat_exchange else 0.0) for c in scene.contacts]
         heated = [_times(k_c, loads.on_contact("foundation_temperature", i)) for i, (_, k_c) in enumerate(contacts)]
         terms = [
-            (True, None, loads.body),
-            *((True, part, data) for part, data in loads.traction.items()),
-            *((True, part, loads.contact_traction) for part, _ in contacts),
-            (False, None, loads.source),
-            *((False, part, data) for part, data in loads.heat_flux.items()),
-            *((False, part, data) for (part, _), data in zip(contacts, heated, strict=True)),
-            *((False, part, loads.contact_flux) for part, _ in contacts),
+            (True, None, loads.body, "loads.body"),
+            *((True, part, data, f"loads.traction.{part}") for part, data in loads.traction.items()),
+            *((True, part, loads.contact_traction, "contact_traction") for part, _ in contacts),
+            (False, None, loads.source, "heat.source"),
+            *((False, part, data, f"loads.heat_flux.{part}") for part, data in loads.heat_flux.items()),
+            *((False, part, data, HEATED) for (part, _), data in zip(contacts, heated, strict=True)),
+            *((False, part, loads.contact_flux, "contact_flux") for part, _ in contacts),
         ]
         self._constant: tuple[Any, Any] = (
             layout.vector(dim) if moves else None,
             layout.vector(1) if conducts else None,
         )
-        self._moving: list[tuple[bool, Any, Data]] = []
-        for mechanical, part, data in terms:
+        self._moving: list[tuple[bool, Any, Data, str]] = []
+        for mechanical, part, data, what in terms:
             if not (moves if mechanical else conducts):
                 continue
             if of_time(data):
-                self._moving.append((mechanical, rule(part, data), data))
+                self._moving.append((mechanical, rule(part, data), data, what))
             elif callable(data) or np.any(data):
-                self._add(self._constant, mechanical, rule(part, data), data, 0.0)
-        moving = [any(mechanical == motion for mechanical, _, _ in self._moving) for motion in (True, False)]
+                self._add(self._constant, mechanical, rule(part, data), data, 0.0, what)
+        moving = [any(mechanical == motion for mechanical, *_ in self._moving) for motion in (True, False)]
         self._present = layout.vector(dim) if moving[0] else None, layout.vector(1) if moving[1] else None
         self._supports = (
             layout.vector(dim)
@@ -181,18 +185,18 @@ class LoadVectors:
         self._reactive = conducts and any(c.heats for c in scene.contacts)
         self._kept: dict[str, Array] = {}
 
-    def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float) -> None:
-        vector = rule.load(self._together(data, rule.positions, t, self._dim if mechanical else 1))
+    def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float, what: str) -> None:
+        vector = rule.load(self._together(data, rule.positions, t, self._dim if mechanical else 1, what))
         (pair[0] if mechanical else pair[1]).axpy(1.0, vector)
         vector.destroy()  # petsc4py would only mark it for a later collection
 
-    def _together(self, data: Data, x: Array, t: float, components: int) -> Array:
+    def _together(self, data: Data, x: Array, t: float, components: int, what: str) -> Array:
         """`evaluate` on every rank's own places; when it fails on one, all raise ValueError and none waits for the others."""
         if self._comm.size == 1:
-            return evaluate(data, x, t, components)
+            return evaluate(data, x, t, components, what)
         values, error = np.empty((0, components)), ""
         try:
-            values = evaluate(data, x, t, components)
+            values = evaluate(data, x, t, components, what)
         except Exception as own:
             error = str(own) or repr(own)
         errors = [other for other in self._comm.allgather(error) if other]
@@ -208,7 +212,7 @@ class LoadVectors:
         out, moving = np.zeros(len(x)), False
         for i, points in self._points.items():
             value = self._loads.on_contact(name, i)
-            out[points] = self._together(value, x[points], t, 1)[:, 0]
+            out[points] = self._together(value, x[points], t, 1, f"contact.{name}")[:, 0]
             moving = moving or of_time(value)
         if not moving:
             self._kept[name] = out
@@ -221,32 +225,37 @@ class LoadVectors:
         out: dict[str, tuple[Any, Array]] = {}
         for part in self._held[which]:
             nodes = np.unique(self._mesh.parts[part])
-            out[part] = nodes, self._together(given.get(part, 0.0), x[nodes], t, (self._dim, 1)[which])
+            what = f"supports.{('displacement', 'temperature')[which]}.{part}"
+            out[part] = nodes, self._together(given.get(part, 0.0), x[nodes], t, (self._dim, 1)[which], what)
         return out
 
-    def _support(self, which: int, t: float) -> Any:
+    def _support(self, which: int, t: float, step: float) -> Any:
         vector = self._supports[which]
         if vector is None:
             return None
         values = np.zeros((len(self._mesh.nodes), (self._dim, 1)[which]))
-        before = self.held(0, t - self._step) if which == 0 else None
+        before = self.held(0, t - step) if which == 0 else None
         for part, (nodes, now) in self.held(which, t).items():
-            values[nodes] = now if before is None else (now - before[part][1]) / self._step
+            values[nodes] = now if before is None else (now - before[part][1]) / step
         self._layout.distribute(values.ravel(), vector)
         return vector
 
-    def at(self, t: float) -> StepData:
-        """The data of the step that ends at time t, valid until the next call; the vectors must not be changed."""
+    def at(self, t: float, step: float | None = None) -> StepData:
+        """The data of the step of size `step` (default: the scene's) that ends at time t, valid until the next call.
+
+        The vectors must not be changed.
+        """
+        step = step or self._step
         pair: list[Any] = list(self._constant)
         for i, present in enumerate(self._present):
             if present is not None:
                 self._constant[i].copy(present)
                 pair[i] = present
-        for mechanical, rule, data in self._moving:
-            self._add((pair[0], pair[1]), mechanical, rule, data, t)
+        for mechanical, rule, data, what in self._moving:
+            self._add((pair[0], pair[1]), mechanical, rule, data, t, what)
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
         return StepData(
-            pair[0], pair[1], self.on_points("gap", t), self._support(0, t), self._support(1, t), foundation
+            pair[0], pair[1], self.on_points("gap", t), self._support(0, t, step), self._support(1, t, step), foundation
         )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from warmslip.errors import SUMS, TERMS
-from warmslip.scene import FullScene, build_full
+from warmslip.scene import FullScene, SceneError, build
 
 Row = dict[str, Any]
 
@@ -105,7 +105,7 @@ def papers(scene: FullScene) -> bool:
     """Whether `entitled` speaks of the scene: the paper's square with its supports, loads at rest, whatever the constants."""
     supports, initial = scene.supports, scene.initial
     return (
-        scene.mesh.shape == "square"
+        scene.mesh.name == "square"
         and (supports.displacement, set(supports.temperature)) == (["top"], {"top", "left", "right"})
         and (initial.displacement, initial.velocity, initial.temperature) == (None, None, 0)
         and set(scene.loads.traction) == {"left", "right"}
@@ -121,17 +121,21 @@ def table(path: Path, scene: Row) -> list[Row]:
     entitled one here (`warmslip check` states what its corners and its start allow). Raises ValueError for fewer than three
     levels with h = k.
     """
-    rows, built = read(path), build_full(scene)
+    rows = read(path)
+    try:
+        built: FullScene | None = build(dict(scene)).full()
+    except SceneError:  # not of the paper's kind
+        built = None
     reference = rows[-1]["h"]
     diagonal = sorted((r for r in rows[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
     if len(diagonal) < 3:
         raise ValueError(f"{path}: {len(diagonal)} levels with h = k say nothing about an order; give at least three")
-    singular = abs(np.linalg.det(np.array(scene["heat"]["conductivity"]))) < 1e-12
-    hot = scene["contact"]["heat_exchange"]["foundation_temperature"] != scene["initial"]["temperature"]
     out: list[Row] = []
     for term in [*TERMS, *SUMS]:
         limit = float("nan")
-        if papers(built):
+        if built is not None and papers(built):
+            singular = abs(np.linalg.det(np.array(built.heat.conductivity))) < 1e-12
+            hot = built.contact.heat_exchange.foundation_temperature != built.initial.temperature
             limit = entitled(term, hot=hot, singular_conductivity=singular, viscosity=built.viscosity.pair(2))
         before: Row | None = None
         for line in diagonal:

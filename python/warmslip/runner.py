@@ -95,7 +95,7 @@ class Run:
     def steps(self) -> Iterator[Any]:
         """Advances to the end, yielding a report a step; stops before a step that is not right, whose state is not kept."""
         for n in range(self.taken + 1, self.scene.time.steps + 1):
-            report = self.stepper.advance(*self.discretisation.load_vectors.at(n * self.scene.step))
+            report = self.stepper.advance(*self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step))
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
             if report.outcome != _core.Outcome.right:

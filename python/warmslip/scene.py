@@ -8,7 +8,7 @@ import json
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args, get_origin
 
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
@@ -92,6 +92,27 @@ class Scene(t.Table):
             _set(data, key, value)
         return _build(data, type(self))
 
+    def _formulas(self) -> list[tuple[str, Any]]:
+        """Data that are formulas, and supports that are not simply held at zero."""
+        data: dict[str, Any] = {
+            "loads.body": self.loads.body,
+            **{f"loads.traction.{part}": value for part, value in self.loads.traction.items()},
+            **{f"loads.heat_flux.{part}": value for part, value in self.loads.heat_flux.items()},
+            "heat.source": self.heat.source if self.heat else 0.0,
+            "initial.displacement": self.initial.displacement,
+            "initial.velocity": self.initial.velocity,
+            "initial.temperature": self.initial.temperature,
+        }
+        for contact in self.contacts:
+            data["contact.gap"] = contact.gap
+            exchange = contact.heat_exchange
+            data["contact.heat_exchange.foundation_temperature"] = exchange.foundation_temperature if exchange else 0.0
+        held = {"supports.displacement": self.supports.moved, "supports.temperature": self.supports.warmed}
+        found = [(key, v) for key, value in data.items() for v in (value if isinstance(value, list) else [value])]
+        return [(key, v) for key, v in found if isinstance(v, str)] + [
+            (key, value) for key, value in held.items() if value
+        ]
+
     def full(self) -> FullScene:
         """The same problem with every block there, those that were absent with no effect.
 
@@ -101,7 +122,10 @@ class Scene(t.Table):
         data = self.resolved()
         d = self.mesh.dim
         zero = [[0.0] * d for _ in range(d)]
-        problems = []
+        problems = [
+            f"{key}: only constant data can be judged here, at zero on the supports; '{value}' is none"
+            for key, value in self._formulas()
+        ]
         if self.regions:
             problems.append("regions: only one material can be judged here; leave the table out")
         if len(self.contacts) != 1 or self.contacts[0].stiffness is None:
@@ -190,14 +214,23 @@ def _parse(text: str) -> Any:
 
 def _set(data: dict[str, Any], key: str, value: Any) -> None:
     *tables, last = key.split(".")
+    place: Any = data
     for depth, table in enumerate(tables):
-        data = data.setdefault(table, {})
-        if not isinstance(data, dict):
-            raise SceneError(f"{key}: '{'.'.join(tables[: depth + 1])}' is a value, not a table")
+        here = ".".join(tables[: depth + 1])
+        if isinstance(place, list):  # of contact parts
+            if not table.isdigit() or int(table) >= len(place):
+                raise SceneError(f"{key}: give the number of the contact part, 0 to {len(place) - 1}")
+            place = place[int(table)]
+        else:
+            place = place.setdefault(table, {})
+        if isinstance(place, list) and not (depth + 1 < len(tables) and place and isinstance(place[0], dict)):
+            raise SceneError(f"{key}: '{here}' is a value, not a table")
+        if not isinstance(place, dict | list):
+            raise SceneError(f"{key}: '{here}' is a value, not a table")
     if value is None:
-        data.pop(last, None)
+        place.pop(last, None)
     else:
-        data[last] = value
+        place[last] = value
 
 
 def build(data: dict[str, Any]) -> Scene:
@@ -254,9 +287,14 @@ def _sentence(error: Any) -> str:
 def _allowed(where: list[str]) -> list[str]:
     """The keys of the table at a place; numbers and free names lead into lists and tables of tables."""
     model: Any = Scene
+    free = False  # the next part is a name that the user chose
     for part in where:
         fields = getattr(model, "model_fields", {})
-        model = _table(fields[part].annotation) if part in fields else model if part.isdigit() or not fields else None
+        if free or part.isdigit():
+            free = False
+            continue
+        model = _table(fields[part].annotation) if part in fields else None
+        free = part in fields and get_origin(fields[part].annotation) is dict
     return sorted(getattr(model, "model_fields", {}))
 
 

@@ -49,7 +49,7 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
     """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
     s, d = job.stepper, job.discretisation
     cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
-    report = job.report
+    report, moves = job.report, d.problem.moves
     return (
         {
             "n": job.scene.mesh.counts[0],
@@ -61,10 +61,10 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
         | {"outcome": job.outcome}
         | {f"identity_{name}": job.worst[name] for name in IDENTITIES}
         | {
-            "norm_u_V": d.norms.v(s.u),
-            "norm_u_L2": d.norms.l2(s.u),
-            "norm_w_L2": d.norms.l2(s.w),
-            "norm_theta_L2": d.norms.l2(s.theta),
+            "norm_u_V": d.norms.v(s.u) if moves else 0.0,
+            "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
+            "norm_w_L2": d.norms.l2(s.w) if moves else 0.0,
+            "norm_theta_L2": d.norms.l2(s.theta) if d.problem.conducts else 0.0,
         }
         | stress_measures(d, s)
         | {
@@ -93,13 +93,24 @@ def study(
 ) -> list[dict[str, Any]]:
     """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
 
+    A level is the number of bricks along the first axis, and of steps; the other axes keep their ratio to it. Numbers of a field
+    that the scene does not have are 0.
+
     Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
     Raises RuntimeError naming the member when a run does not end right.
     """
+    if scene.mesh.file is not None:
+        raise SceneError("mesh.file: a mesh from a file cannot be refined in a study; use a square or a cube")
+    if any(ratio != 1 for ratio in scene.mesh.grading or []):
+        raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
+    counts = scene.mesh.counts
+    if uneven := [n for n in levels if any(n * count % counts[0] for count in counts)]:
+        raise SceneError(f"mesh.n = {counts}: level {uneven[0]} cannot keep the ratio of the axes; give other levels")
     meshes: dict[int, Discretisation] = {}
 
     def job(n: int, steps: int) -> Run:
-        one = scene.override(**{"mesh.n": n, "time.steps": steps})
+        axes = [n * count // counts[0] for count in counts]
+        one = scene.override(**{"mesh.n": n if len(set(axes)) == 1 else axes, "time.steps": steps})
         if n not in meshes:
             meshes[n] = discretise(one)
         return Run(one, discretisation=replace(meshes[n], scene=one))

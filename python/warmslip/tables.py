@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from warmslip import mesh_files
 from warmslip.expressions import Value
@@ -25,6 +25,10 @@ def _number_or_matrix(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{value!r} is neither a finite number nor a matrix; give one")
     return value
+
+
+def _listed(value: Any) -> str:
+    return "one" if isinstance(value, dict) else "several"
 
 
 # c stands for c times the identity
@@ -177,6 +181,15 @@ class HeatTable(Table):
     heating: HeatingTable | None = None
 
 
+class RegionHeatTable(Table):
+    """As [heat], without the source, which is one formula for the whole body."""
+
+    conductivity: Tensor
+    capacity: Positive = 1.0
+    expansion: ExpansionTable | None = None
+    heating: HeatingTable | None = None
+
+
 class RegionTable(Table):
     """A part of the body with a material of its own: named in the mesh file, or `where` a formula of x, y, z holds.
 
@@ -187,7 +200,7 @@ class RegionTable(Table):
     inertia: InertiaTable | None = None
     elasticity: IsotropicTable | None = None
     viscosity: IsotropicTable | None = None
-    heat: HeatTable | None = None
+    heat: RegionHeatTable | None = None
 
 
 class LoadsTable(Table):
@@ -199,8 +212,12 @@ class LoadsTable(Table):
 class SupportsTable(Table):
     """Parts that are held: names (at zero), or a table of names and what they are held at."""
 
-    displacement: list[str] | dict[str, Values] = []  # Gamma_D
-    temperature: list[str] | dict[str, Value] = []
+    displacement: Annotated[
+        Annotated[list[str], Tag("several")] | Annotated[dict[str, Values], Tag("one")], Discriminator(_listed)
+    ] = []  # Gamma_D
+    temperature: Annotated[
+        Annotated[list[str], Tag("several")] | Annotated[dict[str, Value], Tag("one")], Discriminator(_listed)
+    ] = []
 
     @property
     def moved(self) -> dict[str, list[float | str]]:
@@ -214,7 +231,8 @@ class SupportsTable(Table):
 
 
 class FrictionTable(Table):
-    """|sigma_tau| <= min(cohesion + mu p_nu, limit): Coulomb, Tresca (cohesion alone), or one that is cut off.
+    """|sigma_tau| <= min(cohesion + mu p_nu, limit): Coulomb, Tresca (cohesion alone), or one that is cut off. A cohesion acts
+    on all of the part, also where there is no pressure.
 
     With `speed`, mu falls from `coefficient` at rest to `kinetic` at slip speeds far above `speed`. With `regularisation`
     the law is smeared over that slip speed, and sticking points creep.
@@ -231,6 +249,10 @@ class FrictionTable(Table):
     def _pairs(self) -> Self:
         if (self.kinetic is None) != (self.speed is None):
             raise ValueError("kinetic and speed belong together; give both or neither")
+        if self.kinetic is not None and self.kinetic > self.coefficient:
+            raise ValueError(
+                f"kinetic = {self.kinetic:g} exceeds coefficient = {self.coefficient:g}; friction falls with speed"
+            )
         return self
 
     def creep(self, share: float) -> float:

@@ -50,7 +50,7 @@ def test_the_command(command: Command, tmp_path: Path) -> None:
     assert "4 states in series/body.pvd" in command("export", "run", "--out", "series").stdout
     missing = command("export", "nowhere", "--out", "series")
     assert missing.returncode == 2
-    assert missing.stderr.startswith("error: cannot read or write a file")
+    assert "'nowhere' holds no trajectory.h5; give the folder" in missing.stderr
     with Trajectory(tmp_path / "run/trajectory.h5") as t:
         assert t.u is None
         assert t.theta.shape[0] == 4

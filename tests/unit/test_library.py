@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import pytest
 from conftest import Command
 
 import warmslip
-from warmslip import explain
+from warmslip import explain, study
 from warmslip.scene import library
 
 # one number of each, regression: norm of the last state, or what its essay promises
@@ -133,6 +134,39 @@ def test_the_command_says_what_it_costs(command: Command) -> None:
     assert "ms a step" in told
     assert "contact on 'bottom': whether it touches is known only by running" in told
     assert "cost here" not in command("explain", "heat_slab", "--no-trial").stdout
+
+
+@pytest.mark.parametrize("name", ["quasistatic_punch", "heat_slab", "two_materials", "sliding_block"])
+def test_a_study_of_a_scene_without_some_blocks(name: str, tmp_path: Path) -> None:
+    """Its errors fall, those of absent fields are 0, and the axes keep their ratio."""
+    levels, reference = ([8, 16], 32) if name == "heat_slab" else ([4, 8], 16)
+    scene = warmslip.load(name).override(**{"time.end": 0.25})
+    rows = study.study(scene, levels=levels, reference=reference)
+    assert (rows[0]["e_u_V"] > rows[1]["e_u_V"] > 0) == scene.moves
+    assert (rows[0]["e_theta_L2"] > rows[1]["e_theta_L2"] > 0) == (scene.heat is not None)
+    counts = scene.mesh.counts
+    assert rows[0]["unknowns"] == (2 * scene.moves + (scene.heat is not None)) * (levels[0] + 1) * (
+        levels[0] * counts[1] // counts[0] + 1
+    )
+
+
+def test_a_moving_support_has_the_velocity_of_every_step_size() -> None:
+    """Members of a study share their data; each has its own step."""
+    scene = warmslip.load("quasistatic_punch").override(**{"mesh.n": 4, "time.steps": 8})
+    alone = warmslip.run(scene.override(**{"time.steps": 4})).u
+    shared = warmslip.discretise(scene)
+    run = warmslip.Run(
+        scene.override(**{"time.steps": 4}),
+        discretisation=replace(shared, scene=scene.override(**{"time.steps": 4})),
+    )
+    assert len(list(run.steps())) == 4
+    assert np.abs(shared.field(run.stepper.u) - alone).max() <= 1e-15
+
+
+@pytest.mark.parametrize(("name", "words"), [("plate_with_hole", "cannot be refined"), ("brake_pad", "are not nested")])
+def test_what_cannot_be_refined_is_said(name: str, words: str) -> None:
+    with pytest.raises(warmslip.SceneError, match=words):
+        study.study(warmslip.load(name), levels=[4, 8], reference=16)
 
 
 @pytest.mark.mpi

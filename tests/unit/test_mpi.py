@@ -81,4 +81,4 @@ def test_a_load_that_fails_on_one_rank_is_refused_by_both(tmp_path: Path) -> Non
     result = subprocess.run(
         command, env=child_environment(), text=True, capture_output=True, timeout=120, cwd=tmp_path, check=True
     )
-    assert result.stdout.count("refused: a load is not finite at t = 0.666667") == 2
+    assert result.stdout.count("refused: loads.body is not finite at t = 0.666667") == 2

@@ -54,7 +54,7 @@ HARMFUL = [
 @pytest.mark.parametrize("text", HARMFUL, ids=range(len(HARMFUL)))
 def test_what_is_no_formula_is_refused(text: str) -> None:
     with pytest.raises(
-        ValueError, match=r"formula|unknown name|no call|not a number|takes|write a < b|too large|evaluated"
+        ValueError, match=r"formula|unknown name|write where|no call|not a number|takes|write a < b|too large|evaluated"
     ):
         Expression(text)
     with pytest.raises(SceneError, match=r"contact\.gap"):
@@ -129,6 +129,19 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"heat.conductivity": -1.0}, "heat.conductivity must not have a negative eigenvalue"),
     ({"heat.conductivity": "high"}, "heat.conductivity"),
     ({"heat.capacity": 0.0}, "heat.capacity = 0.0"),
+    ({"regions": {"core": {"where": "x - 0.5"}}}, "regions.core.where: 'x - 0.5' is no condition; compare"),
+    ({"regions": {"core": {"where": "x < 1", "haet": {}}}}, "regions.core.haet: unknown key; did you mean 'heat'?"),
+    (
+        {"regions": {"core": {"where": "x < 1", "heat": {"conductivity": 1.0, "source": 1.0}}}},
+        "heat.source: unknown key",
+    ),
+    (
+        {"contact.friction": {"coefficient": 0.1, "kinetic": 0.2, "speed": 1.0}},
+        "kinetic = 0.2 exceeds coefficient = 0.1",
+    ),
+    ({"contact.gap": "t^2"}, "'^' is no power; write x ** 2"),
+    ({"contact.gap": "1 if x < 1 else 2"}, "write where(condition, one, other)"),
+    ({"supports.displacement": {"top": ["t^2", 0.0]}}, "supports.displacement.top.0: in 't^2'"),
     ({"regions": {"core": {}}}, "regions.core: unknown region; the mesh has none by name"),
     ({"regions": {"core": {"where": "x < t"}}}, "regions.core.where: a region cannot depend on t"),
     ({"regions": {"core": {"where": "x <"}}}, "regions.core.where: 'x <' is not a formula"),
@@ -146,11 +159,41 @@ def test_refused_with_key_and_cure(change: dict[str, Any], words: str) -> None:
     assert words in str(refusal.value)
 
 
+def test_one_line_for_one_formula() -> None:
+    with pytest.raises(SceneError) as refusal:
+        load("paper_mixed").override(**{"supports.displacement": {"top": ["t^2", 0.0]}})
+    assert len(str(refusal.value).splitlines()) == 1
+
+
+def test_keys_of_several_contact_parts() -> None:
+    both = [{"part": "bottom", "stiffness": 10.0}, {"part": "left", "stiffness": 20.0}]
+    scene = load("paper_mixed").override(contact=both, **{"supports.temperature": ["top"]})
+    assert scene.override(**{"contact.1.gap": "x"}).contacts[1].gap == "x"
+    assert load("paper_mixed", ["contact=[{part='bottom', stiffness=1.0}]", "contact.0.gap=0.5"]).contacts[0].gap == 0.5
+    for key in ("contact.2.gap", "contact.bottom.gap", "contact.gap.x"):
+        with pytest.raises(SceneError, match="give the number of the contact part, 0 to 1"):
+            scene.override(**{key: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"contact.gap": "x"}, "contact.gap: only constant data can be judged here"),
+        ({"supports.displacement": {"top": ["t", 0.0]}}, "supports.displacement: only constant data"),
+        ({"contact.friction.cohesion": 1.0}, "only Coulomb's law"),
+        ({"contact": None}, "one contact part with a stiffness is needed here"),
+    ],
+)
+def test_what_the_paper_s_model_has_not_is_said(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        load("paper_mixed").override(**change).full()
+
+
 def test_a_formula_that_fails_at_some_time_keeps_what_was_computed(tmp_path: Path) -> None:
     scene = load("paper_mixed").override(
         **{"mesh.n": 4, "time.steps": 8, "loads.body": ["log(0.6 - t)", 0.0], "output.every": 1}
     )
-    with pytest.raises(ValueError, match=r"not finite at t = 0\.625"):
+    with pytest.raises(ValueError, match=r"loads\.body is not finite at t = 0\.625"):
         warmslip.run(scene, out=tmp_path)
     with warmslip.Trajectory(tmp_path / "trajectory.h5") as t:
         assert t.time[-1] == 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -327,6 +328,13 @@ def test_two_materials_in_series() -> None:
     assert result.theta.max() == pytest.approx(6.0)
     middle = np.isclose(np.asarray(warmslip.discretise(scene).mesh.nodes)[:, 1], 1.0)
     assert result.theta[middle] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_a_region_with_heat_can_be_read_again(tmp_path: Path) -> None:
+    scene = paper(regions={"core": {"where": "x < 0.5", "heat": {"conductivity": 5.0}}})
+    warmslip.run(scene, out=tmp_path)
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as t:
+        assert build(t.scene) == build(scene.resolved()) == scene
 
 
 def test_a_full_tensor_is_its_lame_pair() -> None:
