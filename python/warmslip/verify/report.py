@@ -118,7 +118,7 @@ def markdown(
     summary = f"**{total - wrong} of {total} lines pass.** Where the expected numbers come from: {counts}."
     out = [HEAD.format(summary=summary)]
     out += [
-        f"| [{name}](#{name}) | {titles[name]} | {len(rows)} | {failed[name] or ''} |\n"
+        row(f"[{name}](#{name})", titles[name], str(len(rows)), str(failed[name] or ""))
         for name, rows in topics.items()
     ]
     for figure in figures:
