@@ -197,6 +197,7 @@ def run(
         for report in job.steps():
             writer.step(report, job.taken)
             if folder is not None and job.taken % scene.output.checkpoint == 0 and job.taken < scene.time.steps:
+                writer.write()  # no checkpoint is ahead of its trajectory
                 checkpoint.save(folder, job)
             if progress and rank == 0:
                 progress(job.taken, scene.time.steps, report)

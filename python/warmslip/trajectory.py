@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -17,10 +18,12 @@ from warmslip.problem import Discretisation
 
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 LEDGER = tuple(_core.Ledger.terms)
+# held back before it is written: bytes, seconds
+LARGEST, LONGEST = 2**25, 1.0
 
 
 class TrajectoryWriter:
-    """Appends steps as they come and flushes each, so that an interrupted run is readable to its last step.
+    """Appends steps as they come and flushes them every second, so that a run that is killed is readable to its last second.
 
     States are stored every `output.every` steps; the last good one always, also when a step raised. Gathering is
     collective, rank 0 alone writes; without a path nothing is written.
@@ -34,6 +37,8 @@ class TrajectoryWriter:
         self._file: h5py.File | None = None
         self._writing, self._stored = path is not None, -1
         self._alone = comm.size == 1
+        self._rows: dict[str, list[Array]] = {}
+        self._held, self._written = 0, time.monotonic()
         self._fields = [name for name in ("u", "w", "theta") if getattr(stepper, name) is not None]
         if path is None or comm.rank != 0:
             return
@@ -79,10 +84,20 @@ class TrajectoryWriter:
         file.swmr_mode = True  # readable to the last flush, also when the process is killed
 
     def _append(self, name: str, value: Any) -> None:
-        assert self._file is not None
-        dataset = self._file[name]
-        dataset.resize(len(dataset) + 1, axis=0)
-        dataset[-1] = value
+        row = np.array(value)
+        self._rows.setdefault(name, []).append(row)
+        self._held += row.nbytes
+
+    def write(self) -> None:
+        """Writes what is held back and flushes it."""
+        if self._file is None:
+            return
+        for name, rows in self._rows.items():
+            dataset = self._file[name]
+            dataset.resize(len(dataset) + len(rows), axis=0)
+            dataset[-len(rows) :] = rows
+        self._file.flush()
+        self._rows, self._held, self._written = {}, 0, time.monotonic()
 
     def _state(self) -> None:
         stepper = self._stepper
@@ -93,7 +108,6 @@ class TrajectoryWriter:
         self._append("states/time", stepper.time)
         for name, values in fields.items():
             self._append(f"states/{name}", values)
-        self._file.flush()
 
     def _copy(self, earlier: Path, keep: int) -> None:
         """Takes over the first `keep` steps and the states up to them."""
@@ -140,9 +154,10 @@ class TrajectoryWriter:
                 self._append("contact/force", np.reshape(stepper.contact_force, shape))
                 self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
                 self._append("contact/status", stepper.status)
-            self._file.flush()
         if self._writing and taken % scene.output.every == 0:
             self._state()
+        if self._held > LARGEST or time.monotonic() - self._written > LONGEST:
+            self.write()
 
     def __enter__(self) -> Self:
         if self._writing and self._taken == 0:
@@ -156,6 +171,7 @@ class TrajectoryWriter:
         if self._writing and (kind is None or self._alone):
             if self._stored != self._taken:
                 self._state()
+            self.write()
             mises = self._d.mises(self._stepper) if self._d.problem.moves else None
             if self._file is not None and mises is not None:
                 path = self._file.filename
@@ -163,6 +179,7 @@ class TrajectoryWriter:
                 self._file = h5py.File(path, "r+")
                 self._file["fields/mises"] = mises
         if self._file is not None:
+            self.write()
             self._file.close()
 
 
