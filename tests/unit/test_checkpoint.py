@@ -105,38 +105,45 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
     assert Run(scene()).resume(tmp_path) == 5
 
 
-def killed(folder: Path, seconds: float) -> bool:
-    """Starts or goes on with the run and kills it after some time; whether it was over before."""
-    words = [word for key in [*KEYS, "mesh.n=24", "time.steps=300"] for word in ("--set", key)]
+LONG = ["mesh.n=32", "time.steps=1200", "output.every=50", "output.checkpoint=40"]
+
+
+def killed(folder: Path, after: float | None) -> bool:
+    """Starts or goes on with a run and kills it `after` seconds beyond its first checkpoint; whether it ended by itself."""
+    words = [word for key in LONG for word in ("--set", key)]
     program = str(Path(sys.executable).parent / "warmslip")
+    newest = folder / checkpoint.NAMES[0]
+    begin = newest.stat().st_mtime_ns if newest.exists() else 0
     process = subprocess.Popen(
         [program, "run", "paper_mixed", *words, "--out", str(folder), "--resume"],
         env=child_environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    try:
-        _, errors = process.communicate(timeout=seconds)
-    except subprocess.TimeoutExpired:
-        os.kill(process.pid, signal.SIGKILL)
-        process.communicate()
-        return False
-    assert process.returncode == 0, errors.decode()
-    return True
+    while after is not None and process.poll() is None:
+        if newest.exists() and newest.stat().st_mtime_ns > begin:  # so that every process brings the run on
+            time.sleep(after)
+            process.send_signal(signal.SIGKILL)
+            break
+        time.sleep(0.002)
+    _, errors = process.communicate(timeout=600)
+    assert process.returncode in (0, -signal.SIGKILL), errors.decode()
+    return process.returncode == 0
 
 
 def kill_at_random(folder: Path, times: int, seed: int = 1) -> None:
-    """Kills a run `times` times at random moments and resumes it each time, against the run that was left alone."""
-    begin = time.perf_counter()
-    assert killed(folder / "whole", 600.0)
-    length = time.perf_counter() - begin
-    moments, count = random.Random(seed), 0
+    """Kills runs `times` times while they step and resumes them each time, against the run that was left alone."""
+    assert killed(folder / "whole", None)
+    moments, count, torn = random.Random(seed), 0, 0
     while count < times:
-        torn = folder / f"torn{count}"
-        while not killed(torn, moments.uniform(0.3, 0.7) * length):
+        here = folder / f"torn{torn}"
+        while count < times and not killed(here, moments.uniform(0.0, 0.4)):
             count += 1
-        same(folder / "whole", torn)
-        count += 1
+        if count == times:
+            assert killed(here, None)
+        same(folder / "whole", here)
+        torn += 1
+    assert torn <= times
 
 
 @pytest.mark.slow
