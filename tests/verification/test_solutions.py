@@ -35,7 +35,7 @@ def test_report() -> None:
     lines = solutions.report(full=False)
     assert red(lines) == []
     assert len({(x.case, x.proves) for x in lines}) == len(lines)
-    assert {x.origin for x in lines} == {"manufactured"}
+    assert {x.origin for x in lines} == {"manufactured", "comparison"}
 
 
 # ---- what must turn exactness red -------------------------------------------------------------------------------------
