@@ -10,6 +10,7 @@ import json
 import os
 import zipfile
 import zlib
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,11 +25,14 @@ NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
 
 
+_fingerprint = cache(provenance.fingerprint)  # it reads every source, and this process has one code
+
+
 def _owner(job: Run) -> dict[str, Any]:
     """What must be the same for the same next step."""
     return {
         "scene": job.scene.digest(),
-        "fingerprint": provenance.fingerprint(),
+        "fingerprint": _fingerprint(),
         "solver": job.stepper.solver,
         "ranks": job.comm.size,
     }

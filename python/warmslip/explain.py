@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import resource
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from warmslip.consistency import contact_keys
 from warmslip.expressions import constant
 from warmslip.scene import Scene
 from warmslip.tables import ContactTable
@@ -71,7 +72,7 @@ def removable(scene: Scene) -> dict[str, str]:
 def _of_contact(contact: ContactTable) -> dict[str, str]:
     out = {}
     friction, exchange = contact.friction, contact.heat_exchange
-    if friction is not None and friction.coefficient == 0 and friction.cohesion == 0 and not friction.kinetic:
+    if friction is not None and friction.coefficient == 0 and friction.cohesion == 0:
         out["contact.friction"] = "the bound is 0"
     if exchange is not None and exchange.conductance == 0 and exchange.per_pressure == 0:
         out["contact.heat_exchange"] = "no heat is led"
@@ -93,15 +94,17 @@ def _stays_cold(scene: Scene) -> bool:
         *scene.supports.warmed.values(),
         *(e.foundation_temperature for e in exchanges),
     ]
-    return constant(*data) and _zero(data) and not makes and scene.moves
+    touches = all(c.stiffness is not None for c in scene.contacts)  # a part that only exchanges heat would be left
+    return constant(*data) and _zero(data) and not makes and touches and scene.moves
 
 
 def pruned(scene: Scene) -> Scene:
-    """The scene without what `removable` names; raises SceneError never for a scene that is consistent."""
+    """The scene without what `removable` names."""
     gone: dict[str, Any] = dict.fromkeys(removable(scene))
     if "heat" in gone:  # and what speaks of it
         gone |= dict.fromkeys(("supports.temperature", "initial.temperature", "loads.heat_flux"))
-        gone |= dict.fromkeys(("contact.heat_exchange", "contact.friction_heating") if scene.contact else ())
+        for key, _ in contact_keys(scene):
+            gone |= dict.fromkeys((f"{key}.heat_exchange", f"{key}.friction_heating"))
         gone |= {"time.coupling": "staggered"}
         gone = {key: value for key, value in gone.items() if not key.startswith(("heat.", "loads.heat_flux."))}
     if "contact" in gone:
@@ -137,12 +140,7 @@ def plan(scene: Scene) -> Plan:
         steps += ["one substitution with the factor of M/k + D + J"] if heat else []
     if touching:
         kind = "semismooth Newton on the contact points"
-        smooth = any(
-            c.exponent != 1 or c.pressure_limit or (c.friction and (c.friction.speed or c.friction.limit))
-            for c in touching
-        )
-        regular = any(c.friction and c.friction.regularisation for c in touching)
-        kept = d == 2 and not smooth and not regular
+        kept = d == 2 and all(_piecewise_linear(c) for c in touching)
         steps.append(f"{kind}, its factor {'kept while statuses stay' if kept else 'made anew in every iteration'}")
         steps += [
             f"regularised friction on '{c.part}': a point under half its bound creeps at {c.friction.creep(0.5):.3g}"
@@ -228,15 +226,15 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     found = plan(scene)
     size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    changes = {
-        "solver": job.stepper.solver,
-        "setup_seconds": setup,
-        "step_seconds": step,
-        "seconds": setup + scene.time.steps * step,
-        "memory_bytes": float(memory),
-        "fields": [*found.fields, size],
-    }
-    return Plan(**{name: changes.get(name, getattr(found, name)) for name in Plan.__dataclass_fields__})
+    return replace(
+        found,
+        fields=[*found.fields, size],
+        solver=job.stepper.solver,
+        setup_seconds=setup,
+        step_seconds=step,
+        seconds=setup + scene.time.steps * step,
+        memory_bytes=float(memory),
+    )
 
 
 def text(found: Plan) -> str:

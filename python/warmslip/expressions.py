@@ -7,7 +7,6 @@ import math
 import warnings
 from typing import Annotated, Any
 
-import numexpr
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
@@ -132,6 +131,8 @@ class Expression:
         return np.array(np.broadcast_to(self._evaluate(x, t), (len(x),)), dtype=float)
 
     def _evaluate(self, x: NDArray[np.float64], t: float) -> NDArray[Any]:
+        import numexpr
+
         columns = [np.ascontiguousarray(x[:, i]) if i < x.shape[1] else np.zeros(len(x)) for i in range(3)]
         known = dict(zip(VARIABLES, (*columns, float(t)), strict=True))
         try:

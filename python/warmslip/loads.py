@@ -14,6 +14,8 @@ from warmslip.expressions import Expression, constant
 from warmslip.scene import Scene
 
 Array = NDArray[np.float64]
+# what supports hold, and its components (None: as many as axes)
+SUPPORTS: dict[str, int | None] = {"displacement": None, "temperature": 1}
 HEATED = "contact.heat_exchange.foundation_temperature"
 # constants, or functions of positions (points, d) and time returning (points,) or (points, d)
 Data = Any
@@ -134,8 +136,10 @@ class LoadVectors:
     def __init__(self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any) -> None:
         dim = scene.mesh.dim
         self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
-        self._mesh, self._layout, self._step = mesh, layout, scene.step
-        self._held = list(scene.supports.displacement), list(scene.supports.temperature)
+        self._nodes, self._layout, self._step = np.asarray(mesh.nodes), layout, scene.step
+        self._held = {
+            name: {part: np.unique(mesh.parts[part]) for part in getattr(scene.supports, name)} for name in SUPPORTS
+        }
         moves, conducts = scene.moves, scene.heat is not None
         quadrature = _core.LoadQuadrature2 if dim == 2 else _core.LoadQuadrature3
         rules: dict[tuple[str | None, int], Any] = {}
@@ -172,14 +176,11 @@ class LoadVectors:
                 self._add(self._constant, mechanical, rule(part, data), data, 0.0, what)
         moving = [any(mechanical == motion for mechanical, *_ in self._moving) for motion in (True, False)]
         self._present = layout.vector(dim) if moving[0] else None, layout.vector(1) if moving[1] else None
-        self._supports = (
-            layout.vector(dim)
-            if moves and any(callable(v) or np.any(v) for v in loads.displacement.values())
-            else None,
-            layout.vector(1)
-            if conducts and any(callable(v) or np.any(v) for v in loads.temperature.values())
-            else None,
-        )
+        # a support that stays where it is has no velocity; one at zero has no temperature
+        self._velocity = layout.vector(dim) if moves and any(map(of_time, loads.displacement.values())) else None
+        warm = conducts and any(callable(v) or np.any(v) for v in loads.temperature.values())
+        self._temperature = layout.vector(1) if warm else None
+        self._warmed = False
         touching = [i for i, c in enumerate(scene.contacts) if c.stiffness is not None]
         self._points = {i: np.flatnonzero(np.asarray(surface.contacts, int) == i) for i in touching}
         self._reactive = conducts and any(c.heats for c in scene.contacts)
@@ -218,27 +219,36 @@ class LoadVectors:
             self._kept[name] = out
         return out
 
-    def held(self, which: int, t: float) -> dict[str, tuple[Any, Array]]:
-        """Given displacement (which = 0) or temperature (1) at time t: held nodes and their values by part."""
-        given = (self._loads.displacement, self._loads.temperature)[which]
-        x = np.asarray(self._mesh.nodes)
-        out: dict[str, tuple[Any, Array]] = {}
-        for part in self._held[which]:
-            nodes = np.unique(self._mesh.parts[part])
-            what = f"supports.{('displacement', 'temperature')[which]}.{part}"
-            out[part] = nodes, self._together(given.get(part, 0.0), x[nodes], t, (self._dim, 1)[which], what)
-        return out
+    def held(self, name: str, t: float) -> dict[str, tuple[Any, Array]]:
+        """What is given at time t, by part: held nodes (n,), their `displacement` (n, d) or `temperature` (n, 1)."""
+        given, components = getattr(self._loads, name), SUPPORTS[name] or self._dim
+        return {
+            part: (
+                nodes,
+                self._together(given.get(part, 0.0), self._nodes[nodes], t, components, f"supports.{name}.{part}"),
+            )
+            for part, nodes in self._held[name].items()
+        }
 
-    def _support(self, which: int, t: float, step: float) -> Any:
-        vector = self._supports[which]
-        if vector is None:
+    def _support_velocity(self, t: float, step: float) -> Any:
+        if self._velocity is None:
             return None
-        values = np.zeros((len(self._mesh.nodes), (self._dim, 1)[which]))
-        before = self.held(0, t - step) if which == 0 else None
-        for part, (nodes, now) in self.held(which, t).items():
-            values[nodes] = now if before is None else (now - before[part][1]) / step
-        self._layout.distribute(values.ravel(), vector)
-        return vector
+        values = np.zeros((len(self._nodes), self._dim))
+        before = self.held("displacement", t - step)
+        for part, (nodes, now) in self.held("displacement", t).items():
+            values[nodes] = (now - before[part][1]) / step
+        self._layout.distribute(values.ravel(), self._velocity)
+        return self._velocity
+
+    def _support_temperature(self, t: float) -> Any:
+        if self._temperature is None or self._warmed:
+            return self._temperature
+        values = np.zeros(len(self._nodes))
+        for nodes, now in self.held("temperature", t).values():
+            values[nodes] = now[:, 0]
+        self._layout.distribute(values, self._temperature)
+        self._warmed = not any(map(of_time, self._loads.temperature.values()))
+        return self._temperature
 
     def at(self, t: float, step: float | None = None) -> StepData:
         """The data of the step of size `step` (default: the scene's) that ends at time t, valid until the next call.
@@ -254,9 +264,8 @@ class LoadVectors:
         for mechanical, rule, data, what in self._moving:
             self._add((pair[0], pair[1]), mechanical, rule, data, t, what)
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
-        return StepData(
-            pair[0], pair[1], self.on_points("gap", t), self._support(0, t, step), self._support(1, t, step), foundation
-        )
+        velocity, temperature = self._support_velocity(t, step), self._support_temperature(t)
+        return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation)
 
 
 def _times(factor: float, data: Data) -> Data:

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 CELLS = {2: "triangle", 3: "tetra"}
 FACETS = {2: "line", 3: "triangle"}
@@ -115,6 +113,9 @@ def _oriented(nodes: Any, cells: Any) -> Any:
 
 
 def _connected(cells: Any, nodes: int) -> None:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     first, others = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()
     count, label = connected_components(coo_array((np.ones(len(first)), (first, others)), shape=(nodes, nodes)))
     used = np.zeros(nodes, bool)

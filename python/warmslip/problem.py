@@ -182,11 +182,11 @@ class Discretisation:
         Fields that the problem does not have are left aside.
         """
         u, w, theta = u.copy(), w.copy(), theta.copy()
-        for part, (nodes, values) in self.load_vectors.held(0, time).items():
+        for part, (nodes, values) in self.load_vectors.held("displacement", time).items():
             u[nodes] = values
             if part not in self.loads.displacement:  # a support that moves has the velocity that is given
                 w[nodes] = 0
-        for nodes, values in self.load_vectors.held(1, time).values():
+        for nodes, values in self.load_vectors.held("temperature", time).values():
             theta[nodes] = values[:, 0]
         return self.state(stepper, u, w, theta, time)
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <Eigen/Sparse>
 
+#include "warmslip/contact_solver.hpp"
 #include "warmslip/layout.hpp"
 #include "warmslip/problem.hpp"
 
@@ -47,5 +48,21 @@ class ContactSurface {
   RealTable<d> positions_, normals_;
   Eigen::VectorXd weights_;
 };
+
+/// The contact problem of one step of size k from the displacement `u` at its start (d points) with the gap of its end
+/// (points); `free` and `scale` as there.
+template <int d>
+ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurface<d>& surface, double k,
+                                  const Eigen::VectorXd& u, const Eigen::VectorXd& gap, Eigen::VectorXd free,
+                                  double scale);
+
+/// What the contact itself does to the heat at every contact point, see ContactHeat.
+struct ContactFlow {
+  Eigen::VectorXd conductance;  ///< omega per_pressure p_nu
+  Eigen::VectorXd friction;     ///< share of the frictional power, into the body
+};
+template <int d>
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap);
 
 }  // namespace warmslip

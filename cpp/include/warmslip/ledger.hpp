@@ -73,16 +73,4 @@ class Bookkeeper {
   Point<d> centroid_;                                              // moments are taken about it
 };
 
-/// What the contact itself does to the heat at every contact point, see ContactHeat.
-struct ContactFlow {
-  Eigen::VectorXd conductance;  ///< omega per_pressure p_nu
-  Eigen::VectorXd friction;     ///< share of the frictional power, into the body
-};
-template <int d>
-ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
-                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap);
-
-/// y = a x; nothing when there is no such operator.
-void multiply(Mat a, Vec x, Vec y);
-
 }  // namespace warmslip

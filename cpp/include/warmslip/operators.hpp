@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "warmslip/element.hpp"
+#include "warmslip/factor.hpp"
 #include "warmslip/layout.hpp"
 #include "warmslip/problem.hpp"
 #include "warmslip/quadrature.hpp"
@@ -39,6 +40,10 @@ MatHandle heat_matrix(const Operators<d>& operators, double k);
 template <int d>
 MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k,
                          double scale);
+
+/// The scale of the heat rows with which the coupled matrix is symmetric, if there is one, and what it then is.
+template <int d>
+std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem);
 
 /// Quadrature points of the rank's cells or of the facets of a part, and the load vector of data given there.
 template <int d>

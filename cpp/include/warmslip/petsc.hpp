@@ -58,6 +58,9 @@ VecHandle duplicate(Vec like);
 /// Unknowns a node.
 Eigen::Index block_size(Vec v);
 
+/// y = a x; nothing when there is no such operator.
+void multiply(Mat a, Vec x, Vec y);
+
 /// A view of a vector's own entries as an Eigen array, for reading or writing; returned to PETSc on destruction. Of no
 /// vector: no entries.
 class Values {

@@ -64,6 +64,11 @@ struct Problem {
   /// Whether there is a velocity, and a temperature, to solve for.
   bool moves() const { return inertial() || has(&Material<d>::elasticity) || has(&Material<d>::viscosity); }
   bool conducts() const { return has(&Material<d>::conductivity); }
+  bool conducts_symmetrically() const {
+    for (const auto& m : materials)
+      if (m.conductivity && !m.conductivity->isApprox(m.conductivity->transpose())) return false;
+    return true;
+  }
   /// Whether some contact part conducts or makes heat by its forces.
   bool contact_heats() const {
     for (const auto& c : contacts)

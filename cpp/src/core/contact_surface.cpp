@@ -144,7 +144,43 @@ Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) 
   return half * shape_.transpose();
 }
 
-template class ContactSurface<2>;
-template class ContactSurface<3>;
+template <int d>
+ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurface<d>& surface, double k,
+                                  const Eigen::VectorXd& u, const Eigen::VectorXd& gap, Eigen::VectorXd free,
+                                  double scale) {
+  ContactProblem<d> out{{}, k, {}, std::move(free), scale};
+  for (const ContactPart& part : problem.contacts) out.laws.push_back(part.law.value_or(ContactLaw{}));
+  for (Eigen::Index i = 0; i < surface.points(); ++i) {
+    const Point<d> nu = surface.normals().row(i).transpose(), here = u.segment<d>(i * d);
+    out.points.push_back({nu, surface.weights()[i], here.dot(nu) - gap[i], here, gap[i], surface.contact(i)});
+  }
+  return out;
+}
+
+template <int d>
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap) {
+  ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
+  for (Eigen::Index i = 0; i < surface.points(); ++i) {
+    const ContactPart& part = problem.contacts[surface.contact(i)];
+    const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
+    const double r = u.segment<d>(i * d).dot(nu) - gap[i], speed = (velocity - velocity.dot(nu) * nu).norm(),
+                 weight = surface.weights()[i];
+    flow.conductance[i] = weight * part.heat.per_pressure * part.law->compliance.pressure(r);
+    flow.friction[i] =
+        part.heat.friction_share * friction_power(part.law->friction, weight * part.law->bound(r, speed).value, speed);
+  }
+  return flow;
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                                                  \
+  template class ContactSurface<d>;                                                                              \
+  template ContactProblem<d> contact_problem<d>(const Problem<d>&, const ContactSurface<d>&, double,             \
+                                                const Eigen::VectorXd&, const Eigen::VectorXd&, Eigen::VectorXd, \
+                                                double);                                                         \
+  template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&,      \
+                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
+WARMSLIP_INSTANTIATE(2)
+WARMSLIP_INSTANTIATE(3)
 
 }  // namespace warmslip

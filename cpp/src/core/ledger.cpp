@@ -93,26 +93,6 @@ struct Resultant {
 
 }  // namespace
 
-void multiply(Mat a, Vec x, Vec y) {
-  if (a) WARMSLIP_PETSC(MatMult(a, x, y));
-}
-
-template <int d>
-ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
-                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap) {
-  ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
-  for (Eigen::Index i = 0; i < surface.points(); ++i) {
-    const ContactPart& part = problem.contacts[surface.contact(i)];
-    const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
-    const double r = u.segment<d>(i * d).dot(nu) - gap[i], speed = (velocity - velocity.dot(nu) * nu).norm(),
-                 weight = surface.weights()[i];
-    flow.conductance[i] = weight * part.heat.per_pressure * part.law->compliance.pressure(r);
-    flow.friction[i] =
-        part.heat.friction_share * friction_power(part.law->friction, weight * part.law->bound(r, speed).value, speed);
-  }
-  return flow;
-}
-
 template <int d>
 Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                           const ContactSurface<d>& surface)
@@ -167,15 +147,15 @@ Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepI
 template <int d>
 void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const Eigen::VectorXd w_points = surface_.at_points(surface_.nodal_values(after.w));
-  ContactProblem<d> problem{{}, in.k, {}, in.contact_free, in.contact_scale};
-  for (const ContactPart& part : problem_.contacts) problem.laws.push_back(part.law.value_or(ContactLaw{}));
+  const ContactProblem<d> problem =
+      contact_problem(problem_, surface_, in.k, before.contact_u, after.gap, in.contact_free, in.contact_scale);
   double stored_before = 0;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
     const Point<d> u0 = before.contact_u.segment<d>(i * d), u1 = after.contact_u.segment<d>(i * d);
     const double weight = surface_.weights()[i];
     const double r1 = u1.dot(nu) - after.gap[i], r0 = u0.dot(nu) - after.gap[i], r_old = u0.dot(nu) - before.gap[i];
-    const ContactLaw& law = problem.laws[surface_.contact(i)];
+    const ContactLaw& law = problem.law(static_cast<std::size_t>(i));
     l.contact += weight * law.compliance.energy(r1);
     stored_before += weight * law.compliance.energy(r_old);
     l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
@@ -183,7 +163,6 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
         weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
     const double speed = (w - w.dot(nu) * nu).norm();
     l.friction += in.k * friction_power(law.friction, weight * law.bound(r1, speed).value, speed);
-    problem.points.push_back({nu, weight, r0, u0, after.gap[i], surface_.contact(i)});
   }
   l.contact_change = l.contact - stored_before;
   l.law_residual = law_residual(problem, in.contact_force, w_points, &l.law_floor);
@@ -357,11 +336,7 @@ void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const S
     if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                             \
-  template class Bookkeeper<d>;                                                                             \
-  template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&, \
-                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
-WARMSLIP_INSTANTIATE(2)
-WARMSLIP_INSTANTIATE(3)
+template class Bookkeeper<2>;
+template class Bookkeeper<3>;
 
 }  // namespace warmslip

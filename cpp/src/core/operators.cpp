@@ -165,11 +165,34 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   return a;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                            \
-  template struct Operators<d>;                                                                            \
-  template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double); \
-  template MatHandle heat_matrix<d>(const Operators<d>&, double);                                          \
-  template MatHandle coupled_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double, double);
+// With R = c M the heat rows divided by c make the coupled matrix symmetric: definite for c > 0 unless the coupling is
+// strong, quasi-definite for c < 0 (Vanderbei, SIAM J. Optim. 5, 1995). Of several materials all must have the same c.
+template <int d>
+std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem) {
+  double product = 0, expansion = 0;
+  for (const Material<d>& m : problem.materials) {
+    if (m.expansion) expansion += m.expansion->squaredNorm();
+    if (m.expansion && m.heating) product += m.heating->cwiseProduct(*m.expansion).sum();
+  }
+  const double c = expansion > 0 ? product / expansion : 0;
+  bool any = false;
+  for (const Material<d>& m : problem.materials) {
+    const Tensor2<d> heating = m.heating.value_or(Tensor2<d>::Zero()),
+                     stress = m.expansion.value_or(Tensor2<d>::Zero());
+    any = any || !heating.isZero(0) || !stress.isZero(0);
+    if ((heating - c * stress).norm() > 1e-14 * heating.norm()) return {1, Symmetry::general};
+  }
+  if (!any) return {1, problem.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general};
+  if (c == 0 || !problem.conducts_symmetrically()) return {1, Symmetry::general};
+  return {1 / c, c > 0 ? Symmetry::positive_definite : Symmetry::symmetric};
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                                                   \
+  template struct Operators<d>;                                                                                   \
+  template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double);        \
+  template MatHandle heat_matrix<d>(const Operators<d>&, double);                                                 \
+  template MatHandle coupled_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double, double); \
+  template std::pair<double, Symmetry> coupled_symmetry<d>(const Problem<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

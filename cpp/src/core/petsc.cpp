@@ -22,6 +22,10 @@ Eigen::Index block_size(Vec v) {
   return block;
 }
 
+void multiply(Mat a, Vec x, Vec y) {
+  if (a) WARMSLIP_PETSC(MatMult(a, x, y));
+}
+
 Values::Values(Vec vec) : vec_(vec) {
   if (!vec) return;
   WARMSLIP_PETSC(VecGetLocalSize(vec, &size_));
