@@ -110,6 +110,30 @@ def test_what_can_be_left_out_changes_nothing(key: str) -> None:
             assert np.abs(one - other).max() <= 1e-12 * max(1e-300, np.abs(other).max())
 
 
+def test_heat_is_left_out_of_several_contact_parts() -> None:
+    cold = {"part": "bottom", "stiffness": 1e3, "heat_exchange": {"conductance": 1.0}}
+    walls = [cold, {"part": "left", "stiffness": 10.0}]
+    values = {"mesh.n": 4, "time.steps": 3, "supports.temperature": ["top"], "loads.traction": {}}
+    scene = warmslip.load("paper_isotropic").override(heat={"conductivity": 1.0}, contact=walls, **values)
+    smaller = explain.pruned(scene)
+    assert smaller.heat is None
+    assert np.array_equal(warmslip.run(smaller).u, warmslip.run(scene).u)
+    apart = scene.override(contact=[*walls, {"part": "right", "heat_exchange": {"conductance": 1.0}}])
+    assert "heat" not in explain.removable(apart)  # that part would be left with nothing
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("quasistatic_punch", "kept while statuses stay"),
+        ("brake_pad", "made anew in every iteration"),
+        ("block_3d", "made anew in every iteration"),
+    ],
+)
+def test_a_plan_says_what_newton_keeps(scene: str, words: str) -> None:
+    assert words in explain.text(explain.plan(warmslip.load(scene)))
+
+
 @pytest.mark.parametrize(
     "change",
     [
