@@ -313,6 +313,7 @@ def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> N
     """The books close with all blocks present, contact nodes with held temperature among them, whoever solves."""
     scene = everything(dim, coupling)
     own = right(scene)
+    assert own.summary["cost"]["refinements"] == 0  # which would heal a wrong right-hand side
     other = warmslip.run(scene, backend="petsc")
     assert other.outcome == "right"
     for name in ("u", "w", "theta"):
