@@ -40,7 +40,11 @@ def test_the_series_is_the_trajectory(name: str, tmp_path: Path) -> None:
     stiffness = scene.contacts[0].stiffness
     assert pressure == pytest.approx(stiffness * np.maximum(-gap, 0), rel=1e-9, abs=1e-9 * pressure.max())
     bound = 0.3 * pressure
-    traction = np.linalg.norm(points.point_data["friction traction"], axis=1)
+    vectors = points.point_data["friction traction"]
+    weights = np.asarray(warmslip.discretise(scene).surface.weights)
+    on_body = [float(rows[-1][f"friction_{axis}"]) for axis in "xyz"[: result.u.shape[1]]]
+    assert (weights @ vectors)[: len(on_body)] == pytest.approx(on_body, rel=1e-9, abs=1e-12)
+    traction = np.linalg.norm(vectors, axis=1)
     assert (traction <= bound * (1 + 1e-9)).all()
     assert traction[status == 2] == pytest.approx(bound[status == 2], rel=1e-8)
 

@@ -319,7 +319,17 @@ def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> N
     for name in ("u", "w", "theta"):
         assert np.abs(getattr(own, name) - getattr(other, name)).max() <= 1e-9 * np.abs(getattr(own, name)).max()
     run = warmslip.Run(scene)
-    ledgers = [report.ledger for report in run.steps()]
+    ledgers = []
+    parts, x = run.discretisation.mesh.parts, np.asarray(run.discretisation.mesh.nodes)
+    top, left = (np.unique(parts[part]) for part in ("top", "left"))
+    for report in run.steps():  # what is given is what is there, at the corners of Gamma_C too
+        ledgers.append(report.ledger)
+        t = run.stepper.time
+        u, theta = run.discretisation.field(run.stepper.u), run.discretisation.field(run.stepper.theta)
+        assert np.abs(u[top] - [0.1 * t, *[0.0] * (dim - 2), -0.02 * np.sin(t)]).max() <= 1e-15
+        only_top = top[(x[top, 0] > 0) & (x[top, 1] > 0)] if dim == 3 else top[x[top, 0] > 0]
+        assert np.abs(theta[only_top] - t).max() <= 1e-15
+        assert np.abs(theta[np.setdiff1d(left, top)]).max() == 0
     assert min(abs(ledger.support_work) for ledger in ledgers) > 0
     assert min(abs(ledger.held) for ledger in ledgers) > 0
     assert (max(ledger.friction_heating for ledger in ledgers) > 0) == (coupling != "monolithic")
