@@ -32,7 +32,7 @@ def _owner(job: Run) -> dict[str, Any]:
     """What must be the same for the same next step."""
     return {
         "scene": job.scene.digest(),
-        "fingerprint": _fingerprint(),
+        "code": _fingerprint(),
         "solver": job.stepper.solver,
         "ranks": job.comm.size,
     }
