@@ -13,21 +13,38 @@ from typing import TYPE_CHECKING, Any
 from warmslip.scene import Scene, SceneError, load
 
 if TYPE_CHECKING:
+    from warmslip.laws import Law
     from warmslip.loads import Loads
     from warmslip.problem import Discretisation, discretise
     from warmslip.runner import Result, Run, run
+    from warmslip.state import State
     from warmslip.trajectory import Trajectory
 
-__all__ = ["Discretisation", "Loads", "Result", "Run", "Scene", "SceneError", "Trajectory", "discretise", "load", "run"]
+__all__ = [
+    "Discretisation",
+    "Law",
+    "Loads",
+    "Result",
+    "Run",
+    "Scene",
+    "SceneError",
+    "State",
+    "Trajectory",
+    "discretise",
+    "load",
+    "run",
+]
 
 # the compiled core is loaded when it is first needed: scenes can be read and checked without it
 _LAZY = {
+    "Law": "laws",
     "Loads": "loads",
     "Discretisation": "problem",
     "discretise": "problem",
     "Result": "runner",
     "Run": "runner",
     "run": "runner",
+    "State": "state",
     "Trajectory": "trajectory",
 }
 

@@ -126,7 +126,7 @@ class NormalCompliance:
     """
     p_nu(r) = min(stiffness max(r, 0)^exponent, most) (2.8).
     """
-    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex, exponent: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[typing.SupportsFloat | typing.SupportsIndex], typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]] | None) -> None:
+    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex, exponent: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[float], collections.abc.Sequence[float]] | None) -> None:
         """
         `custom`, when not None, takes its place: r > 0 to (pressure, derivative, energy).
         """
@@ -141,7 +141,7 @@ class Friction:
     """
     |sigma_tau| <= min(cohesion + mu(|w_tau|) p_nu, limit) (2.9).
     """
-    def __init__(self, *, coefficient: typing.SupportsFloat | typing.SupportsIndex, cohesion: typing.SupportsFloat | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, kinetic: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex, regularisation: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]] | None) -> None:
+    def __init__(self, *, coefficient: typing.SupportsFloat | typing.SupportsIndex, cohesion: typing.SupportsFloat | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, kinetic: typing.SupportsFloat | typing.SupportsIndex, speed: typing.SupportsFloat | typing.SupportsIndex, regularisation: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[float, float], collections.abc.Sequence[float]] | None) -> None:
         """
         `custom`, when not None, takes its place: (pressure, speed) to (bound, derivative by pressure, by speed).
         """

@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from warmslip import scene as scenes
-
-SceneName = Annotated[str, typer.Argument(help="a scene of the library by name, or the path of a TOML file")]
-Set = Annotated[list[str] | None, typer.Option("--set", help="table.key=value, any number of times")]
+from warmslip.cli_options import SceneName, Set
 
 
 def check(
@@ -33,22 +31,6 @@ def check(
         Console().print(audit_report.table(found, checked.title))
         if out is not None:
             audit_report.write(out, found, studies.stamp(checked))
-
-
-def explain(
-    scene: SceneName,
-    set_: Set = None,
-    trial: Annotated[bool, typer.Option(help="set up and take a few steps to tell the cost")] = True,
-) -> None:
-    """Say what a scene will do and cost before it runs: fields, operators, solver, what could be left out, what is missing."""
-    from mpi4py import MPI
-
-    from warmslip import explain as plans
-
-    checked = scenes.load(scene, set_)
-    found = plans.measured(checked) if trial else plans.plan(checked)
-    if MPI.COMM_WORLD.rank == 0:
-        typer.echo(plans.text(found))
 
 
 def verify(

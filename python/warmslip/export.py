@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import meshio
 import numpy as np
@@ -14,6 +13,7 @@ from warmslip.loads import Array
 from warmslip.mesh_io import write_vtu
 from warmslip.problem import Discretisation, discretise
 from warmslip.scene import Scene, build
+from warmslip.state import contact_fields
 from warmslip.trajectory import Trajectory
 
 STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
@@ -54,22 +54,6 @@ def export(
         if points:
             _pvd(folder / "contact.pvd", points)
     return len(times), scene
-
-
-def contact_fields(d: Discretisation, force: Array, displacement: Array, status: Any, time: float) -> dict[str, Array]:
-    """Pressure and friction traction on the body (stress), gap g - u_nu and slip u_tau (length), status, at the points.
-
-    `force` of the body on the foundation and `displacement` are (points, d), `status` 0 open, 1 stick, 2 slip.
-    """
-    normals, weights = np.asarray(d.surface.normals), np.asarray(d.surface.weights)
-    normal_force, inwards = np.sum(force * normals, axis=1), np.sum(displacement * normals, axis=1)
-    return {
-        "pressure": normal_force / weights,
-        "friction traction": -(force - normal_force[:, None] * normals) / weights[:, None],
-        "gap": d.load_vectors.on_points("gap", time) - inwards,
-        "slip": displacement - inwards[:, None] * normals,
-        "status": np.asarray(status, dtype=float),
-    }
 
 
 def _three(values: Array) -> Array:

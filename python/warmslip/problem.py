@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from warmslip import _core, mesh_files
 from warmslip.expressions import Expression
+from warmslip.laws import Law
 from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
 from warmslip.scene import FullScene, Scene
 from warmslip.tables import ContactTable, IsotropicTable, RegionTable
 
 COUPLINGS = ("expansion", "heating")
+log = logging.getLogger(__name__)
 
 
 def _d(name: str, dim: int) -> Any:
@@ -89,15 +92,16 @@ def _materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
     return materials, numbers.tolist()
 
 
-def contact_part(contact: ContactTable) -> Any:
-    """A contact table as a `_core.ContactPart`."""
+def contact_part(contact: ContactTable, own: Law | None = None) -> Any:
+    """A contact table as a `_core.ContactPart`, with functions of one's `own` in the place of its laws."""
     law, friction, exchange = None, contact.friction, contact.heat_exchange
+    own = own or Law()
     if contact.stiffness is not None:
         compliance = _core.NormalCompliance(
             stiffness=contact.stiffness,
             exponent=contact.exponent,
             most=np.inf if contact.pressure_limit is None else contact.pressure_limit,
-            custom=None,
+            custom=own.compliance,
         )
         bound = _core.Friction(
             coefficient=friction.coefficient if friction else 0.0,
@@ -106,7 +110,7 @@ def contact_part(contact: ContactTable) -> Any:
             kinetic=(friction and friction.kinetic) or 0.0,
             speed=(friction and friction.speed) or 0.0,
             regularisation=(friction and friction.regularisation) or 0.0,
-            custom=None,
+            custom=own.friction,
         )
         law = _core.ContactLaw(compliance=compliance, friction=bound)
     return _core.ContactPart(
@@ -132,6 +136,7 @@ class Discretisation:
     surface: Any
     norms: Any
     load_vectors: LoadVectors
+    laws: dict[str, Law]
 
     @property
     def dim(self) -> int:
@@ -226,10 +231,35 @@ class Discretisation:
         return von_mises(self.stress(u, w, theta))
 
 
-def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, mesh: Any = None) -> Discretisation:
-    """Assembles a scene on a communicator (default: all ranks). `loads` replaces the scene's, `mesh` its structured mesh.
+def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Law]:
+    """The laws, each on a part that touches and tried on samples. Raises ValueError."""
+    touching = [contact.part for contact in scene.contacts if contact.stiffness is not None]
+    for part, law in laws.items():
+        if part not in touching:
+            known = ", ".join(touching) or "none has"
+            raise ValueError(
+                f"laws.{part}: no contact part with a stiffness is called so ({known}); the scene says what touches, even "
+                "where a law takes the place of its stiffness"
+            )
+        law.check(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
+        log.warning(
+            "laws.%s: evaluated in Python at every contact point and iteration, slower than the scene's own laws", part
+        )
+    return laws
 
-    Collective. Raises ValueError when the contact part has no free node.
+
+def discretise(
+    scene: Scene,
+    *,
+    comm: Any = None,
+    loads: Loads | None = None,
+    laws: dict[str, Law] | None = None,
+    mesh: Any = None,
+) -> Discretisation:
+    """Assembles a scene on a communicator (default: all ranks).
+
+    `loads` replaces the scene's, `mesh` its mesh, and `laws` the contact laws of the parts it names. Collective. Raises
+    ValueError when the contact part has no free node or a law is none.
     """
     from mpi4py import MPI
 
@@ -237,6 +267,7 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
     d = scene.mesh.dim
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
+    laws = _checked(laws or {}, scene, mesh)
     materials, regions = _materials(scene, mesh)
     problem = _d("Problem", d)(
         mesh=mesh,
@@ -244,7 +275,7 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
         regions=regions,
         clamped=list(scene.supports.displacement),
         cooled=list(scene.supports.temperature),
-        contacts=[contact_part(contact) for contact in scene.contacts],
+        contacts=[contact_part(contact, laws.get(contact.part)) for contact in scene.contacts],
     )
     layout = _d("Layout", d)(comm, mesh)
     surface = _d("ContactSurface", d)(layout, problem)
@@ -265,6 +296,7 @@ def discretise(scene: Scene, *, comm: Any = None, loads: Loads | None = None, me
         surface,
         _d("Norms", d)(layout),
         vectors,
+        laws,
     )
 
 

@@ -20,8 +20,9 @@ from mpi4py import MPI
 from warmslip import _core, provenance
 from warmslip.errors import Comparison, Largest
 from warmslip.problem import Discretisation, discretise, stress_measures
-from warmslip.runner import IDENTITIES, Run, petsc_options
+from warmslip.runner import IDENTITIES, Run
 from warmslip.scene import Scene, SceneError
+from warmslip.summary import petsc_options
 
 
 def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int]]:

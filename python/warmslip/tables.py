@@ -311,6 +311,7 @@ class InitialTable(Table):
 class OutputTable(Table):
     every: Count = 1  # states stored every so many steps; the last one always
     checkpoint: Count = 100  # steps between two checkpoints
+    checkpoint_minutes: Positive | None = None  # between two checkpoints, whichever comes first
 
 
 # The same for a scene in which every block is there and every datum is a constant. Narrower types of frozen lists are safe,

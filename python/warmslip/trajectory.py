@@ -58,6 +58,7 @@ class TrajectoryWriter:
         file["contact/positions"] = discretisation.surface.positions
         file["contact/normals"] = discretisation.surface.normals
         file["contact/weights"] = discretisation.surface.weights
+        file["contact/part"] = np.array(discretisation.surface.contacts, dtype="i4")
 
         def table(name: str, *shape: int, dtype: str = "f8") -> None:
             file.create_dataset(
@@ -225,6 +226,27 @@ class Trajectory:
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""
         return {name: np.asarray(data) for name, data in self._file[group].items()}
+
+    def xarray(self) -> Any:
+        """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.
+
+        Raises RuntimeError when xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise RuntimeError("xarray is not installed; pip install xarray") from None
+        axes = list("xyz"[: self.nodes.shape[1]])
+        fields = {"u": ("time", "node", "axis"), "w": ("time", "node", "axis"), "theta": ("time", "node")}
+        return xarray.Dataset(
+            {
+                name: (dims, np.asarray(getattr(self, name)))
+                for name, dims in fields.items()
+                if getattr(self, name) is not None
+            },
+            {"time": self.time, "axis": axes, **{a: ("node", self.nodes[:, i]) for i, a in enumerate(axes)}},
+            {"title": self.scene.get("title", "")},
+        )
 
     def close(self) -> None:
         self._file.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -11,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -156,3 +158,59 @@ def test_resume_by_command(command: Command, tmp_path: Path) -> None:
     again = command("run", "heat_slab", "--out", "two", "--resume")  # nothing to go on from
     assert again.returncode == 0, again.stderr
     same(tmp_path / "one", tmp_path / "two")
+
+
+@pytest.mark.parametrize("more", [(), ("contact.quadrature=gauss-2",), ("time.coupling=monolithic",)])
+def test_a_checkpoint_changes_no_bit(more: tuple[str, ...]) -> None:
+    """Wherever it is written, as an interruption or the clock has it: what a stepper forgets there it makes again alike."""
+    plain, forgetful = warmslip.Run(scene(*more)), warmslip.Run(scene(*more))
+    for _ in zip(plain.steps(), forgetful.steps(), strict=True):
+        forgetful.stepper.forget()
+    for name in ("u", "w", "theta"):
+        one, other = (np.asarray(getattr(job.stepper, name).array) for job in (plain, forgetful))
+        assert np.array_equal(one, other), name
+
+
+def test_checkpoints_by_the_clock(tmp_path: Path) -> None:
+    often = scene("output.checkpoint=1000", "output.checkpoint_minutes=1e-9")
+    with pytest.raises(KilledError):
+        warmslip.run(often, out=tmp_path, progress=stop_after(7))
+    taken: list[int] = []
+    warmslip.run(often, out=tmp_path, resume=True, progress=lambda step, *_: taken.append(step))
+    assert taken[0] == 8
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_is_resumable(tmp_path: Path, number: signal.Signals) -> None:
+    """One signal stops after the step, leaves a checkpoint and says so; the resumed run ends as one that was let alone."""
+    whole = warmslip.run(scene(), out=tmp_path / "whole")
+
+    def interrupt(step: int, steps: int, report: Any) -> None:
+        if step == 7:
+            os.kill(os.getpid(), number)
+
+    before = signal.getsignal(number)
+    torn = warmslip.run(scene(), out=tmp_path / "torn", progress=interrupt)
+    assert signal.getsignal(number) is before
+    assert torn.outcome == "interrupted" and not torn.right and torn.summary["steps"] == 8
+    assert json.loads((tmp_path / "torn" / "summary.json").read_text())["outcome"] == "interrupted"
+    again = warmslip.run(scene(), out=tmp_path / "torn", resume=True)
+    assert again.right and np.array_equal(again.u, whole.u) and np.array_equal(again.theta, whole.theta)
+    assert not (tmp_path / "torn" / "checkpoint.npz").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ctrl_c_ends_with_its_own_exit_code(tmp_path: Path, ranks: int) -> None:
+    start = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    program = str(Path(sys.executable).parent / "warmslip")
+    long = ["run", "paper_mixed", "--set", "mesh.n=8", "--set", "time.steps=100000", "--out", str(tmp_path)]
+    process = subprocess.Popen([*start, program, *long], env=child_environment(), stdout=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "checkpoint.npz").exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130 or ranks > 1  # mpirun has an exit code of its own
+    assert process.returncode != 0 and "--resume goes on" in said

@@ -119,7 +119,7 @@ def test_restart_under_a_moving_gap(small: MakeScene) -> None:
     scene = small("isotropic", time__steps=6)
     loads = replace(warmslip.Loads.of(scene), gap=lambda x, t: -1e-3 * (1 + t) + 0 * x[:, 0])
     job = warmslip.Run(scene, loads=loads)
-    ledgers = [report.ledger for report in job.steps()]
+    ledgers = [report.ledger for _, report in job.steps()]
     gained = sum(ledger.contact_change for ledger in ledgers)
     d, half = job.discretisation, warmslip.Run(scene, loads=loads)
     assert gained == pytest.approx(ledgers[-1].contact - 0.5 * 1e4 * 1e-6, rel=1e-9)  # c_nu/2 g(0)^2 over a side of 1
@@ -366,7 +366,7 @@ def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
     assert (theta[np.setdiff1d(np.arange(25), cooled)] == 2).all()
     assert (w[0] == [1, 0.5]).all()
     assert (u[0] == [0.1, 0.2]).all()
-    assert all(report.outcome.name == "right" for report in job.steps())
+    assert all(report.outcome.name == "right" for _, report in job.steps())
 
 
 def test_a_body_at_rest_away_from_the_foundation_stays_there(small: MakeScene) -> None:

@@ -232,7 +232,7 @@ def test_frictional_heat_goes_into_the_body() -> None:
         },
     )
     run = warmslip.Run(scene)
-    lost = sum(report.ledger.friction for report in run.steps())
+    lost = sum(report.ledger.friction for _, report in run.steps())
     d = run.discretisation
     theta = run.stepper.theta
     content = d.operators.mass.createVecLeft()
@@ -322,7 +322,7 @@ def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> N
     ledgers = []
     parts, x = run.discretisation.mesh.parts, np.asarray(run.discretisation.mesh.nodes)
     top, left = (np.unique(parts[part]) for part in ("top", "left"))
-    for report in run.steps():  # what is given is what is there, at the corners of Gamma_C too
+    for _, report in run.steps():  # what is given is what is there, at the corners of Gamma_C too
         ledgers.append(report.ledger)
         t = run.stepper.time
         u, theta = run.discretisation.field(run.stepper.u), run.discretisation.field(run.stepper.theta)
@@ -390,7 +390,7 @@ def test_a_body_carried_by_its_supports_is_affine(coupling: str) -> None:
         initial={"velocity": ["0.1 + 0.2 * x - 0.3 * y", "0.4 * x + 0.1 * y"], "temperature": "1 + 2 * x - y"},
     )
     run = warmslip.Run(scene)
-    for report in run.steps():
+    for _, report in run.steps():
         assert report.ledger.support_work != 0
     assert run.outcome == "right"
     d = run.discretisation

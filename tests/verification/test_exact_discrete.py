@@ -55,7 +55,7 @@ def lines(case: str, scheme: Scheme, job: Run, state: State) -> list[Line]:
 def march(name: str, case: Case) -> tuple[list[Line], list[str]]:
     """Both codes side by side: the lines of all steps and the stages of the core's contact solver."""
     scheme, job, found, stages = case.scheme, case.run(), [], []
-    reports = job.steps()
+    reports = (report for _, report in job.steps())
     for n, state in enumerate(case.states[1:], 1):
         assert state.solutions == 1, f"{name}: {state.solutions} solutions in step {n}"
         report = next(reports, None)

@@ -104,7 +104,7 @@ def worst_error(scene: Scene, data: Scene, warming: float = 0.0) -> tuple[float,
     d, s = job.discretisation, job.stepper
     nodes = np.asarray(d.mesh.nodes)
     d.restart(s, *(f(nodes, 0.0) for f in exact), 0.0)
-    assert all(report.slip == len(d.surface.weights) for report in job.steps())
+    assert all(report.slip == len(d.surface.weights) for _, report in job.steps())
     assert job.outcome == "right"
     errors = [
         np.abs(d.field(v) - f(nodes, s.time)).max() / np.abs(f(nodes, s.time)).max()

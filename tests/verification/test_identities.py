@@ -78,7 +78,7 @@ def test_balances(tmp_path: Path, reading: str, coupling: str, quadrature: str) 
 def test_opposite_coupling_cancels() -> None:
     """R = -M, monolithic: what expansion takes from the motion, heating gives to the heat, term by term."""
     job = warmslip.Run(scene("consistent", time__coupling="monolithic"))
-    for report in job.steps():
+    for _, report in job.steps():
         assert report.ledger.heating == pytest.approx(-report.ledger.expansion_work, rel=1e-11)
 
 

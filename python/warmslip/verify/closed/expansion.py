@@ -55,7 +55,7 @@ def _column(stiffness: float, gap: float, pull: float) -> Run:
 
 def _pressed(stiffness: float) -> list[Line]:
     job = _column(stiffness, GAP, 0.0)
-    reports = list(job.steps())
+    reports = [report for _, report in job.steps()]
     name, exact, stated, lines = f"heated column, c_nu = {stiffness:.0e}", pressure(stiffness), floor(stiffness), []
     if job.outcome not in ("right", "precision_lost"):
         raise RuntimeError(f"{name} ended: {job.outcome}, {job.failure}")

@@ -1,0 +1,105 @@
+"""The commands of one scene: explain it, run it, look at what came out."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from warmslip import scene as scenes
+from warmslip.cli_options import SceneName, Set, progress_bar
+from warmslip.scene import Scene, SceneError
+
+
+def run(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(help="folder for trajectory.h5 and summary.json")] = Path("run"),
+    set_: Set = None,
+    backend: Annotated[str, typer.Option(help="automatic, cholmod or petsc")] = "automatic",
+    resume: Annotated[bool, typer.Option("--resume", help="go on from the newest checkpoint in the folder")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="check and explain the scene, write nothing")] = False,
+    petsc: Annotated[
+        str, typer.Option(help='PETSc options, such as "-log_view -momentum_ksp_type cg"; see also PETSC_OPTIONS')
+    ] = "",
+) -> None:
+    """Run a scene. Exit code 0: right; 1: stopped, see the outcome; 2: cannot be run; 130: interrupted, --resume goes on."""
+    if backend not in ("automatic", "cholmod", "petsc"):
+        raise SceneError(f"--backend '{backend}' is unknown; use automatic, cholmod or petsc")
+    if dry_run:
+        explain(scene, set_, trial=False)
+        return
+    checked = scenes.load(scene, set_)
+    if petsc:  # read once, when PETSc starts; it says at the end which of them nothing has used
+        os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} {petsc} -options_left"
+    from mpi4py import MPI
+
+    import warmslip
+
+    rank = MPI.COMM_WORLD.rank
+    with progress_bar(rank) as bar:
+        task = bar.add_task("stepping", total=checked.time.steps, note="")
+
+        def progress(step: int, steps: int, report: Any) -> None:
+            bar.update(task, completed=step, note=f"open {report.open} stick {report.stick} slip {report.slip}")
+
+        result = warmslip.run(checked, out=out, backend=backend, progress=progress, resume=resume)
+    if rank == 0:
+        typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
+    if not result.right:
+        raise typer.Exit(130 if result.outcome == "interrupted" else 1)
+
+
+def _told(summary: dict[str, Any]) -> str:
+    """The end of a run in a few words; of one that stopped, the residuals of the step that was not taken."""
+    failure = summary["failure"]
+    if summary["outcome"] == "interrupted":
+        return f"after {summary['steps']} of {summary['stamp']['scene']['time']['steps']} steps, --resume goes on"
+    if failure is None:
+        worst = max(summary["identities"][i] for i in ("energy", "heat", "force", "law"))
+        return f"{summary['steps']} steps, worst identity {worst:.1e}"
+    words = [failure["reason"]] if failure["reason"] else []
+    words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason")]
+    return f"step {failure['step']} was not taken ({', '.join(words)})"
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")],
+    out: Annotated[Path, typer.Option(help="folder for body.pvd, contact.pvd and series.csv")],
+) -> None:
+    """Write a stored run as a series that ParaView opens, and its resultants and ledger as CSV."""
+    from warmslip import export as series
+
+    with progress_bar() as bar:
+        task = bar.add_task("writing", total=None, note="")
+        count, _ = series.export(run, out, progress=lambda n, total: bar.update(task, completed=n, total=total))
+    typer.echo(f"{count} states in {out}/body.pvd, contact points in contact.pvd, time series in series.csv")
+
+
+def explain(
+    scene: SceneName,
+    set_: Set = None,
+    trial: Annotated[bool, typer.Option(help="set up and take a few steps to tell the cost")] = True,
+) -> None:
+    """Say what a scene will do and cost before it runs: fields, operators, solver, what could be left out, what is missing."""
+    from mpi4py import MPI
+
+    from warmslip import explain as plans
+
+    checked = scenes.load(scene, set_)
+    found = plans.measured(checked) if trial else plans.plan(checked)
+    if MPI.COMM_WORLD.rank == 0:
+        typer.echo(plans.text(found))
+
+
+def list_() -> None:
+    """List the scenes of the library."""
+    for name in scenes.library():
+        typer.echo(f"{name:18s} {scenes.load(name).title}")
+
+
+def schema() -> None:
+    """Print the JSON schema of scene files."""
+    typer.echo(json.dumps(Scene.model_json_schema(), indent=2))

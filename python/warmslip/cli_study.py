@@ -1,0 +1,191 @@
+"""The commands of the workflow: measure studies, derive tables from them, judge and draw."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from warmslip import scene as scenes
+from warmslip.cli_options import SceneName, Set, progress_bar
+from warmslip.figures import KINDS
+from warmslip.scene import SceneError
+
+Csv = Annotated[Path, typer.Option(help="the CSV file to write; its stamp goes beside it as .json")]
+Tables = Annotated[list[Path], typer.Argument(help="tables written by `warmslip study`")]
+
+
+def _levels(text: str) -> list[int]:
+    try:
+        levels = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise SceneError(f"--levels '{text}' is not a list of integers; write 16,32,64") from None
+    if not levels or any(level < 1 for level in levels):
+        raise SceneError(f"--levels '{text}' needs positive integers; write 16,32,64")
+    return levels
+
+
+def _writable(out: Path) -> Path:
+    """`out`, whose folder is there now: nothing is computed for a file that cannot be written. Raises OSError."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    there = out.exists()
+    out.open("a").close()
+    if not there:
+        out.unlink()  # an interrupted run leaves no empty table
+    return out
+
+
+def study(
+    scene: SceneName,
+    out: Csv,
+    levels: Annotated[
+        str, typer.Option(help="bricks along the first axis, and steps, of the members")
+    ] = "16,32,64,128",
+    reference: Annotated[int, typer.Option(help="bricks and steps of the solution taken as exact")] = 256,
+    grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
+    set_: Set = None,
+) -> None:
+    """Measure an h,k refinement study against its finest solution."""
+    from warmslip import study as studies
+
+    checked = scenes.load(scene, set_)
+    if grid not in ("diagonal", "full"):
+        raise SceneError(f"--grid '{grid}' is unknown; use diagonal or full")
+    sizes = _levels(levels)
+    studies.members(sizes, reference, grid)  # refuses before anything is computed
+    _writable(out)
+    with progress_bar() as bar:
+        task = bar.add_task(out.stem, total=reference, note="")
+        rows = studies.study(
+            checked,
+            levels=sizes,
+            reference=reference,
+            grid=grid,
+            progress=lambda n, _: bar.update(task, completed=n),
+        )
+    studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid))
+
+
+def manufactured(
+    out: Csv,
+    levels: Annotated[str, typer.Option(help="1/h of the meshes")] = "8,16,32,64",
+    set_: Set = None,
+) -> None:
+    """Measure the orders on a manufactured solution with contact and slip: h = k for every coupling, k = h^2 staggered."""
+    from warmslip import manufactured as made
+    from warmslip import study as studies
+
+    checked = scenes.load("paper_isotropic", set_).full()
+    _writable(out)
+    rows = made.table(checked, ["staggered", "lagged", "monolithic"], _levels(levels), "h=k")
+    rows += made.table(checked, ["staggered"], _levels(levels), "k=h^2")
+    studies.write(out, rows, studies.stamp(checked, levels=levels))
+
+
+def extremes(
+    out: Csv,
+    n: Annotated[int, typer.Option(help="bricks a side")] = 16,
+    steps: Annotated[int, typer.Option(help="time steps")] = 16,
+    scene: Annotated[str, typer.Option(help="the scene whose parameters climb the ladders")] = "paper_isotropic",
+    set_: Set = None,
+) -> None:
+    """Climb the ladders of extreme parameters and say what became of every run."""
+    from warmslip import extremes as ladders
+    from warmslip import study as studies
+
+    checked = scenes.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])]).full()
+    studies.write(_writable(out), ladders.table(checked), studies.stamp(checked))
+
+
+def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
+    """Writes a table made from other tables; ValueError when those are not what they should be."""
+    from warmslip import provenance
+    from warmslip import study as studies
+
+    names = [p.name for p in sources]
+    try:
+        rows = make()
+    except (LookupError, TypeError, UnicodeDecodeError, ZeroDivisionError) as error:
+        raise ValueError(f"{', '.join(names)}: not tables that `warmslip study` wrote ({error!r})") from error
+    studies.write(out, rows, provenance.stamp(sources=names))
+
+
+def rates(tables: Tables, out: Csv) -> None:
+    """Observed, bias-corrected and entitled orders of studies."""
+    from warmslip import rates as orders
+
+    _derived(out, lambda: [row for path in tables for row in orders.table(path, _scene_of(path))], tables)
+
+
+def _scene_of(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
+
+
+def readings(tables: Tables, out: Csv) -> None:
+    """Which reading of the paper satisfies which of its claims."""
+    from warmslip import readings as claims
+
+    _derived(out, lambda: claims.table(tables), tables)
+
+
+def work(tables: Tables, out: Csv) -> None:
+    """Work against precision of every run of studies, with the front."""
+    from warmslip import work as precision
+
+    _derived(out, lambda: precision.table(tables), tables)
+
+
+def judge(
+    out: Annotated[Path, typer.Option(help="the verdict to write, JSON")],
+    expected: Annotated[Path, typer.Option(help="stored values, JSON")],
+    studies: Annotated[list[Path] | None, typer.Option(help="a study's table, any number of times")] = None,
+    manufactured: Annotated[Path | None, typer.Option()] = None,
+    readings: Annotated[Path | None, typer.Option()] = None,
+    extremes: Annotated[Path | None, typer.Option()] = None,
+    fail: Annotated[bool, typer.Option(help="exit 1 when a check fails")] = True,
+    record: Annotated[
+        bool, typer.Option(help="overwrite the stored values with the measured ones, for review")
+    ] = False,
+) -> None:
+    """Compare measured tables with bands and stored values; always writes the verdict."""
+    from warmslip import judge as court
+    from warmslip import provenance
+
+    def verdict() -> dict[str, Any]:
+        return court.verdict(
+            studies=studies or [],
+            manufactured_table=manufactured,
+            readings=readings,
+            extremes=extremes,
+            expected=court.load(expected),
+        )
+
+    result = verdict()
+    if record:
+        expected.write_text(json.dumps(court.record(result), indent=1) + "\n")
+        result = verdict()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    stamp = provenance.stamp(sources=[p.name for p in (*(studies or []), manufactured, readings, extremes) if p])
+    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n")
+    typer.echo(
+        f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
+    )
+    for name in result["failed"]:
+        detail = next(d for d in result["details"] if d["name"] == name)
+        typer.echo(f"  {name}: {detail['value']} not in [{detail['low']}, {detail['high']}]", err=True)
+    if fail and not result["passed"]:
+        raise typer.Exit(1)
+
+
+def draw(
+    kind: Annotated[str, typer.Argument(help="; ".join(f"{kind}: from {what}" for kind, (_, what) in KINDS.items()))],
+    inputs: Annotated[list[Path], typer.Argument(help="tables or trajectories it is drawn from")],
+    out: Annotated[Path, typer.Option(help="the PNG to write; its caption goes beside it as .rst")],
+) -> None:
+    """Draw a figure from tables."""
+    from warmslip import figures
+
+    figures.draw(kind, inputs, out)

@@ -1,0 +1,70 @@
+"""What is left of a run in a few numbers: summary.json."""
+
+from __future__ import annotations
+
+import resource
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warmslip import _core, provenance
+from warmslip.state import resultants
+
+if TYPE_CHECKING:
+    from warmslip.runner import Run
+
+
+def summary(job: Run) -> dict[str, Any]:
+    """Outcome, norms, contact, identities, cost and stamp of a run as it stands (collective)."""
+    s, norms, report, cost = job.stepper, job.discretisation.norms, job.report, job.stepper.cost
+    contact = dict.fromkeys(("normal_force", "tangential_force", "max_penetration"), 0.0)
+    counts = {"open": len(job.discretisation.surface.weights), "stick": 0, "slip": 0}
+    traction = [0.0] * job.discretisation.dim
+    if report is not None:
+        contact = {
+            "normal_force": report.normal_force,
+            "tangential_force": float(np.linalg.norm(report.friction_traction)),
+            "max_penetration": report.max_penetration,
+        }
+        counts = {name: getattr(report, name) for name in counts}
+        traction = list(report.traction)
+    counters = {name: getattr(cost, name) for name in type(cost).items}
+    force = np.reshape(s.contact_force, (1, -1, job.discretisation.dim))
+    parts = {name: float(values[0]) for name, values in resultants(job.discretisation, force).items()}
+    return {
+        "outcome": job.outcome,
+        "failure": job.failure,
+        "time": s.time,
+        "steps": job.taken,
+        "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
+        | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
+        "contact": contact
+        | counts
+        | {"traction": traction, "parts": parts, "own_laws": sorted(job.discretisation.laws)},
+        "identities": job.worst | job.floors,
+        "newton": {
+            "iterations": cost.newton_iterations,
+            "largest_step": job.newton_max,
+            "stages": job.stages,
+        },
+        "cpu_seconds": time.process_time() - job.began[1],
+        "wall_seconds": time.perf_counter() - job.began[0],
+        "memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "cost": counters,
+        "stamp": provenance.stamp(
+            job.scene,
+            petsc=_core.petsc_version,
+            compiler=_core.compiler,
+            ranks=job.comm.size,
+            solver=s.solver,
+            petsc_options=petsc_options(),
+        ),
+    }
+
+
+def petsc_options() -> dict[str, str]:
+    """PETSc's options database, as recorded in the stamp."""
+    from petsc4py import PETSc
+
+    return {str(k): str(v) for k, v in PETSc.Options().getAll().items()}
