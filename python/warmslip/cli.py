@@ -36,7 +36,7 @@ for command in (
     cli_scene.run,
     cli_scene.explain,
     cli_scene.export,
-    # cli_scene.view,
+    cli_scene.view,
     cli_verify.check,
     cli_study.study,
     cli_study.manufactured,

@@ -13,6 +13,8 @@ from warmslip import scene as scenes
 from warmslip.cli_options import SceneName, Set, progress_bar
 from warmslip.scene import Scene, SceneError
 
+RunFolder = Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")]
+
 
 def run(
     scene: SceneName,
@@ -66,16 +68,49 @@ def _told(summary: dict[str, Any]) -> str:
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")],
+    run: RunFolder,
     out: Annotated[Path, typer.Option(help="folder for body.pvd, contact.pvd and series.csv")],
+    fields: Annotated[str, typer.Option(help="names, comma between: displacement,pressure; default all")] = "",
+    times: Annotated[str, typer.Option(help="times, comma between, of the nearest stored states; default all")] = "",
 ) -> None:
     """Write a stored run as a series that ParaView opens, and its resultants and ledger as CSV."""
     from warmslip import export as series
 
+    names = [name.strip() for name in fields.split(",")] if fields else series.FIELDS
     with progress_bar() as bar:
         task = bar.add_task("writing", total=None, note="")
-        count, _ = series.export(run, out, progress=lambda n, total: bar.update(task, completed=n, total=total))
+        count = series.export(
+            run,
+            out,
+            fields=names,
+            times=_times(times),
+            progress=lambda n, total: bar.update(task, completed=n, total=total),
+        )
     typer.echo(f"{count} states in {out}/body.pvd, contact points in contact.pvd, time series in series.csv")
+
+
+def _times(text: str) -> list[float] | None:
+    try:
+        return [float(part) for part in text.split(",")] if text else None
+    except ValueError:
+        raise SceneError(f"--times '{text}' is not a list of times; write 0.25,0.5") from None
+
+
+def view(
+    run: RunFolder,
+    out: Annotated[Path, typer.Option(help="folder for report.html, the figures and the animation")],
+    at: Annotated[float | None, typer.Option(help="time of the state that is drawn; default the last one")] = None,
+    animate: Annotated[bool, typer.Option(help="also draw the body through time, animation.gif")] = True,
+) -> None:
+    """Draw a stored run: body, contact, history and animation, and one page with all of it, report.html."""
+    from warmslip import view as viewing
+
+    with progress_bar() as bar:
+        task = bar.add_task("drawing", total=None, note="")
+        files = viewing.view(
+            run, out, at=at, animate=animate, progress=lambda n, total: bar.update(task, completed=n, total=total)
+        )
+    typer.echo(f"{', '.join(path.name for path in files)} in {out}")
 
 
 def explain(

@@ -3,71 +3,108 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+import difflib
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import meshio
 import numpy as np
 
 from warmslip.loads import Array
-from warmslip.mesh_io import write_vtu
-from warmslip.problem import Discretisation, discretise
-from warmslip.scene import Scene, build
-from warmslip.state import contact_fields
+from warmslip.mesh_io import BODY, three, write_vtu
+from warmslip.problem import Discretisation
+from warmslip.state import contact_fields, resultants
 from warmslip.trajectory import Trajectory
 
 STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
+CONTACT = ("pressure", "friction traction", "gap", "slip", "status")
+FIELDS = (*BODY, *CONTACT)
+
+
+def opened(run: str | Path) -> Trajectory:
+    """The trajectory in the folder of a run. Raises ValueError when there is none."""
+    path = Path(run) / "trajectory.h5"
+    if not path.exists():
+        raise ValueError(f"'{run}' holds no trajectory.h5; give the folder that `warmslip run` wrote")
+    return Trajectory(path)
+
+
+def state_number(t: Trajectory, time: float | None) -> int:
+    """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
+    times = t.time
+    if time is None:
+        return len(times) - 1
+    if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
+        raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
+    return int(np.abs(times - time).argmin())
+
+
+def contact_at(t: Trajectory, d: Discretisation, number: int) -> dict[str, Array]:
+    """Contact fields of a stored state, see `contact_fields`, and the points' displacement; empty where there are none."""
+    step = round(float(t.time[number]) / d.scene.step) - 1
+    if step < 0 or not len(d.surface.weights):
+        return {}
+    force, moved, status, gap = (
+        np.asarray(t.contact(name, step)) for name in ("force", "displacement", "status", "gap")
+    )
+    return contact_fields(d, force, moved, status, gap) | {"displacement": moved}
 
 
 def export(
-    run: str | Path, out: str | Path, *, progress: Callable[[int, int], None] | None = None
-) -> tuple[int, Scene]:
-    """Writes what the folder `run` of `warmslip run` holds to the folder `out`; the number of states and the scene.
+    run: str | Path,
+    out: str | Path,
+    *,
+    fields: Collection[str] = FIELDS,
+    times: Sequence[float] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
 
     body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
-    contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status;
-    series.csv: resultants and ledger of every step. Raises OSError for what is no run or cannot be written.
+    contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
+    `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
+    contact part, and the ledger of every step. Raises ValueError for what is no run, an unknown field or a time beyond the run,
+    OSError when it cannot be written.
     """
-    if not (Path(run) / "trajectory.h5").exists():
-        raise ValueError(f"'{run}' holds no trajectory.h5; give the folder that `warmslip run` wrote")
+    for name in fields:
+        if name not in FIELDS:
+            near = difflib.get_close_matches(name, FIELDS, 1)
+            raise ValueError(
+                f"there is no field '{name}'; "
+                + (f"did you mean '{near[0]}'?" if near else f"give one of {', '.join(FIELDS)}")
+            )
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    with Trajectory(Path(run) / "trajectory.h5") as t:
-        scene = build(t.scene)
-        d = discretise(scene)
-        _series(t, folder / "series.csv")
-        times = t.time
-        touching = t.series("contact") if len(d.surface.weights) and len(t.series("steps")["time"]) else {}
+    with opened(run) as t:
+        d = t.discretisation()
+        chosen = range(len(t.time)) if times is None else sorted({state_number(t, time) for time in times})
+        folder.mkdir(parents=True, exist_ok=True)
+        _series(t, d, folder / "series.csv")
         files: list[tuple[float, str]] = []
         points: list[tuple[float, str]] = []
-        for i, time in enumerate(times):
-            u, w, theta = (None if one is None else np.asarray(one[i]) for one in (t.u, t.w, t.theta))
-            write_vtu(folder / f"body_{i:04d}.vtu", d, u, w, theta)
-            files.append((float(time), f"body_{i:04d}.vtu"))
-            step = round(float(time) / scene.step) - 1
-            if touching and step >= 0:
-                _contact(folder / f"contact_{i:04d}.vtu", d, touching, step, float(time))
-                points.append((float(time), f"contact_{i:04d}.vtu"))
+        for done, i in enumerate(chosen, start=1):
+            time = float(t.time[i])
+            if set(fields) & set(BODY):
+                u, w, theta = (None if one is None else np.asarray(one[i]) for one in (t.u, t.w, t.theta))
+                write_vtu(folder / f"body_{i:04d}.vtu", d, u, w, theta, fields)
+                files.append((time, f"body_{i:04d}.vtu"))
+            touching = {name: values for name, values in contact_at(t, d, i).items() if name in fields}
+            if touching:
+                _contact(folder / f"contact_{i:04d}.vtu", d, touching)
+                points.append((time, f"contact_{i:04d}.vtu"))
             if progress:
-                progress(i + 1, len(times))
-        _pvd(folder / "body.pvd", files)
-        if points:
-            _pvd(folder / "contact.pvd", points)
-    return len(times), scene
+                progress(done, len(chosen))
+        for name, series in (("body", files), ("contact", points)):
+            if series:
+                _pvd(folder / f"{name}.pvd", series)
+    return len(chosen)
 
 
-def _three(values: Array) -> Array:
-    return np.pad(values, ((0, 0), (0, 3 - values.shape[1]))) if values.ndim == 2 else values
-
-
-def _contact(path: Path, d: Discretisation, touching: dict[str, Array], step: int, time: float) -> None:
-    force, displacement, status = (touching[name][step] for name in ("force", "displacement", "status"))
-    fields = contact_fields(d, force, displacement, status, time)
-    x = _three(np.asarray(d.surface.positions))
+def _contact(path: Path, d: Discretisation, fields: dict[str, Array]) -> None:
+    x = three(np.asarray(d.surface.positions))
     meshio.Mesh(
         x,
         [("vertex", np.arange(len(x))[:, None])],
-        point_data={name: _three(values) for name, values in fields.items()},
+        point_data={name: three(values) for name, values in fields.items()},
     ).write(path)
 
 
@@ -79,11 +116,14 @@ def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
     )
 
 
-def _series(t: Trajectory, path: Path) -> None:
+def _series(t: Trajectory, d: Discretisation, path: Path) -> None:
     steps, ledger = t.series("steps"), t.series("ledger")
     friction = steps["friction_traction"]
     columns = {"time": steps["time"]} | {name: steps[name] for name in STEPS}
-    columns |= {f"friction_{axis}": friction[:, i] for i, axis in enumerate("xyz"[: friction.shape[1]])} | ledger
+    columns |= {f"friction_{axis}": friction[:, i] for i, axis in enumerate("xyz"[: friction.shape[1]])}
+    if len(d.surface.weights):
+        columns |= resultants(d, t.series("contact")["force"])
+    columns |= ledger
     with path.open("w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(columns)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -10,26 +12,35 @@ import numpy as np
 from warmslip.loads import Array
 from warmslip.problem import Discretisation, von_mises
 
+BODY = ("displacement", "velocity", "temperature", "stress", "von Mises")
 
-def write_vtu(path: Path, d: Discretisation, u: Array | None, w: Array | None, theta: Array | None) -> None:
-    """One state as VTU for ParaView: displacement, velocity, temperature at the nodes, stress and von Mises a cell.
+
+def three(values: Array) -> Array:
+    """Vectors (n, d) with the three components that ParaView wants; other arrays as they are."""
+    return np.pad(values, ((0, 0), (0, 3 - values.shape[1]))) if values.ndim == 2 else values
+
+
+def write_vtu(
+    path: Path,
+    d: Discretisation,
+    u: Array | None,
+    w: Array | None,
+    theta: Array | None,
+    fields: Collection[str] = BODY,
+) -> None:
+    """One state as VTU for ParaView: those of `fields` that the scene has, at the nodes, stress and von Mises stress a cell.
 
     Arrays are in mesh numbering, (nodes, d) and (nodes,); None for a field the scene does not have. Raises OSError when the file
     cannot be written.
     """
-    stress = d.stress(u, w, theta)
-
-    def three(values: Array | None) -> Array | None:
-        return (
-            None if values is None else np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
-        )  # ParaView wants three components
-
-    fields = {"displacement": three(u), "velocity": three(w), "temperature": theta}
+    nodal: dict[str, Any] = {"displacement": u, "velocity": w, "temperature": theta}
+    cells: dict[str, Any] = {}
+    if u is not None:
+        stress = d.stress(u, w, theta)
+        cells = {"stress": [stress.reshape(len(stress), -1)], "von Mises": [von_mises(stress)]}
     meshio.Mesh(
         three(np.asarray(d.mesh.nodes)),
         [("triangle" if d.dim == 2 else "tetra", np.asarray(d.mesh.cells))],
-        point_data={name: values for name, values in fields.items() if values is not None},
-        cell_data={"stress": [stress.reshape(len(stress), -1)], "von Mises": [von_mises(stress)]}
-        if u is not None
-        else {},
+        point_data={name: three(v) for name, v in nodal.items() if v is not None and name in fields},
+        cell_data={name: v for name, v in cells.items() if name in fields},
     ).write(path)

@@ -39,8 +39,8 @@ def fingerprint() -> str:
     """A hash of everything that solves: the compiled core and the Python modules that step it."""
     digest = hashlib.sha256()
     compiled = sorted(PACKAGE.parent.parent.glob("build/cp*/_core.*.so")) or sorted(PACKAGE.glob("_core.*.so"))
-    afterwards = {"cli", "cli_verify", "__init__", "rates", "readings", "work", "judge", "explain", "export"}
-    sources = sorted(p for p in PACKAGE.glob("*.py") if p.stem not in afterwards)
+    afterwards = {"__init__", "rates", "readings", "work", "judge", "explain", "export", "view"}
+    sources = sorted(p for p in PACKAGE.glob("*.py") if p.stem not in afterwards and not p.stem.startswith("cli"))
     for path in [*compiled, *sources, *sorted(PACKAGE.glob("scenes/paper_*.toml"))]:
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -56,21 +56,22 @@ class State:
         """See `contact_fields`."""
         now, shape = self._now(), (-1, self.discretisation.dim)
         force, moved = np.reshape(now.contact_force, shape), np.reshape(now.contact_displacement, shape)
-        return contact_fields(self.discretisation, force, moved, now.status, self.time)
+        gap = self.discretisation.load_vectors.on_points("gap", self.time)
+        return contact_fields(self.discretisation, force, moved, now.status, gap)
 
 
-def contact_fields(d: Discretisation, force: Array, displacement: Array, status: Any, time: float) -> dict[str, Array]:
+def contact_fields(d: Discretisation, force: Array, displacement: Array, status: Any, gap: Array) -> dict[str, Array]:
     """Pressure and friction traction on the body (stress), gap g - u_nu and slip u_tau (length), status, at the points.
 
-    `force` of the body on the foundation and `displacement` are (points, d), `status` 0 open, 1 stick, 2 slip. The points are
-    those of `discretisation.surface`.
+    `force` of the body on the foundation and `displacement` are (points, d), `status` 0 open, 1 stick, 2 slip, `gap` g (points,).
+    The points are those of `discretisation.surface`.
     """
     normals, weights = np.asarray(d.surface.normals), np.asarray(d.surface.weights)
     normal_force, inwards = np.sum(force * normals, axis=1), np.sum(displacement * normals, axis=1)
     return {
         "pressure": normal_force / weights,
         "friction traction": -(force - normal_force[:, None] * normals) / weights[:, None],
-        "gap": d.load_vectors.on_points("gap", time) - inwards,
+        "gap": gap - inwards,
         "slip": displacement - inwards[:, None] * normals,
         "status": np.asarray(status, dtype=float),
     }

@@ -14,7 +14,8 @@ import numpy as np
 
 from warmslip import _core
 from warmslip.loads import Array
-from warmslip.problem import Discretisation
+from warmslip.problem import Discretisation, discretise
+from warmslip.scene import build
 
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 LEDGER = tuple(_core.Ledger.terms)
@@ -79,6 +80,7 @@ class TrajectoryWriter:
             table("contact/force", points, d)
             table("contact/displacement", points, d)
             table("contact/status", points, dtype="i1")
+            table("contact/gap", points)
         if keep:
             self._copy(earlier, keep)
             self._stored = keep if keep % discretisation.scene.output.every == 0 else -1
@@ -125,7 +127,7 @@ class TrajectoryWriter:
             for group in ("steps", "ledger"):
                 for name in self._file[group]:
                     self._take(file, f"{group}/{name}", np.arange(keep))
-            for name in ("force", "displacement", "status"):
+            for name in ("force", "displacement", "status", "gap"):
                 if f"contact/{name}" in self._file:
                     self._take(file, f"contact/{name}", np.arange(keep))
         earlier.unlink()
@@ -143,6 +145,7 @@ class TrajectoryWriter:
         """Appends the report, the ledger and the contact points of the step just taken, and its state when due (collective)."""
         stepper, scene = self._stepper, self._d.scene
         self._taken = taken
+        gap = self._d.load_vectors.on_points("gap", stepper.time) if self._writing else None
         if self._file is not None:
             self._append("steps/time", stepper.time)
             for name in REPORT:
@@ -155,6 +158,7 @@ class TrajectoryWriter:
                 self._append("contact/force", np.reshape(stepper.contact_force, shape))
                 self._append("contact/displacement", np.reshape(stepper.contact_displacement, shape))
                 self._append("contact/status", stepper.status)
+                self._append("contact/gap", gap)
         if self._writing and taken % scene.output.every == 0:
             self._state()
         if self._held > LARGEST or time.monotonic() - self._written > LONGEST:
@@ -185,7 +189,7 @@ class TrajectoryWriter:
 
 
 class Trajectory:
-    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), `ledger`, `contact`, `steps`.
+    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), the `series` of every step, `contact` points.
 
     A field that the scene does not have is None.
     """
@@ -222,6 +226,16 @@ class Trajectory:
     def theta(self) -> Any:
         """Temperature, (states, nodes)."""
         return self._file.get("states/theta")
+
+    def contact(self, name: str, step: int) -> Any:
+        """`force`, `displacement`, `status` or `gap` of the contact points in a step, counted from 0."""
+        return self._file[f"contact/{name}"][step]
+
+    def discretisation(self) -> Discretisation:
+        """The scene assembled again on this process, with the loads and laws that it states."""
+        from mpi4py import MPI
+
+        return discretise(build(self.scene), comm=MPI.COMM_SELF)
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""

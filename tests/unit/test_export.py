@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,7 +21,7 @@ from warmslip.export import export
 def test_the_series_is_the_trajectory(name: str, tmp_path: Path) -> None:
     scene = warmslip.load(name).override(**{"output.every": 4})
     result = warmslip.run(scene, out=tmp_path / "run")
-    states, _ = export(tmp_path / "run", tmp_path / "series")
+    states = export(tmp_path / "run", tmp_path / "series")
     sets = [one.attrib for one in ElementTree.parse(tmp_path / "series/body.pvd").iter("DataSet")]
     assert [float(one["timestep"]) for one in sets] == pytest.approx(np.linspace(0, scene.time.end, states))
     last = meshio.read(tmp_path / "series" / sets[-1]["file"])
@@ -58,3 +59,30 @@ def test_the_command(command: Command, tmp_path: Path) -> None:
     with Trajectory(tmp_path / "run/trajectory.h5") as t:
         assert t.u is None
         assert t.theta.shape[0] == 4
+
+
+def test_chosen_fields_and_times(tmp_path: Path) -> None:
+    warmslip.run(warmslip.load("paper_mixed", ["mesh.n=4", "time.steps=4"]), out=tmp_path / "run")
+    assert export(tmp_path / "run", tmp_path / "some", fields=["stress", "gap"], times=[0.5, 0.49, 1.0]) == 2
+    names = sorted(path.name for path in (tmp_path / "some").glob("*.vtu"))
+    assert names == ["body_0002.vtu", "body_0004.vtu", "contact_0002.vtu", "contact_0004.vtu"]
+    body, contact = (meshio.read(tmp_path / "some" / f"{name}_0004.vtu") for name in ("body", "contact"))
+    assert (set(body.point_data), set(body.cell_data), set(contact.point_data)) == (set(), {"stress"}, {"gap"})
+    export(tmp_path / "run", tmp_path / "body", fields=["temperature"])
+    assert not (tmp_path / "body/contact.pvd").exists()
+    with pytest.raises(ValueError, match="did you mean 'von Mises'"):
+        export(tmp_path / "run", tmp_path / "none", fields=["von mises"])
+
+
+def test_the_gap_is_the_one_that_was_used(tmp_path: Path) -> None:
+    """Also where Python's loads took the place of the scene's."""
+    scene = warmslip.load("paper_mixed", ["mesh.n=4", "time.steps=2"])
+    loads = replace(warmslip.Loads.of(scene), gap=lambda x, t: 0.1 * t + 0 * x[:, 0])
+    seen = []
+    warmslip.run(
+        scene, out=tmp_path / "run", loads=loads, observers=[lambda state, _: seen.append(state.contact["gap"])]
+    )
+    export(tmp_path / "run", tmp_path / "series")
+    for i, gap in enumerate(seen, start=1):
+        written = meshio.read(tmp_path / f"series/contact_{i:04d}.vtu").point_data["gap"]
+        assert np.allclose(written, gap, rtol=1e-14) and abs(gap.mean()) > 0.01

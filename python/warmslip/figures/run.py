@@ -1,0 +1,198 @@
+"""Any run: the deformed body, the contact, the history, an animation. Arrays in, figures out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from cmcrameri import cm
+from matplotlib.animation import PillowWriter
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, number
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+MAPS = {"displacement": cm.imola, "von Mises stress": cm.batlow, "temperature": cm.lipari}
+STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, INK)
+WIDTHS = {2: 3.9, 3: 4.6}
+
+
+@dataclass(frozen=True)
+class Body:
+    """One state: nodes (n, d), triangles (m, 3) of the body or of its surface, u (n, d), fields (n,) or (m,), contact points."""
+
+    time: float
+    nodes: Array
+    triangles: Any
+    u: Array
+    fields: dict[str, Array]
+    points: Array  # where the contact points are, undeformed (points, d)
+    moved: Array  # their displacement, (points, d)
+    status: Any  # 0 open, 1 stick, 2 slip, (points,)
+
+    @property
+    def dim(self) -> int:
+        return int(self.nodes.shape[1])
+
+
+def magnification(largest: float, size: float) -> float:
+    """The largest of 1, 2, 5, 10, ... with which a displacement stays below a seventh of the body's size."""
+    candidates = [m * 10.0**e for e in range(9) for m in (1, 2, 5)]
+    return max([m for m in candidates if m * largest <= size / 7], default=1.0)
+
+
+def outline(triangles: Any) -> Any:
+    """Edges that belong to one triangle alone, (edges, 2)."""
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    found, count = np.unique(edges, axis=0, return_counts=True)
+    return found[count == 1]
+
+
+def panel(
+    figure: Figure, place: Any, body: Body, name: str, *, factor: float, norm: Normalize, bar: bool = True
+) -> None:
+    """The deformed body coloured by one of its fields."""
+    values, moved = body.fields[name], body.nodes + factor * body.u
+    colours = MAPS.get(name, cm.batlow)
+    ax: Any
+    if body.dim == 3:
+        ax = figure.add_subplot(place, projection="3d")
+        value = values if len(values) == len(body.triangles) else values[body.triangles].mean(axis=1)
+        shade = colours(norm(value))
+        faces = Poly3DCollection(moved[body.triangles], facecolors=shade, edgecolors=shade, linewidths=0.3)
+        ax.add_collection3d(faces)
+        low, high = moved.min(axis=0), moved.max(axis=0)
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=high - low)
+        ax.set_axis_off()
+    else:
+        ax = figure.add_subplot(place)
+        drawn: Any = {"cmap": colours, "norm": norm, "rasterized": True}
+        if len(values) == len(body.triangles):
+            ax.tripcolor(*moved.T, body.triangles, facecolors=values, **drawn)
+        else:
+            ax.tripcolor(*moved.T, body.triangles, values, shading="gouraud", **drawn)
+        edges = outline(body.triangles)
+        ax.add_collection(LineCollection(body.nodes[edges], colors=GREY, linewidths=0.6, linestyles=(0, (4, 3))))
+        ax.add_collection(LineCollection(moved[edges], colors=INK, linewidths=0.8))
+        at = body.points + factor * body.moved
+        for number_, (_, colour) in enumerate(STATUS):
+            on = body.status == number_
+            ax.plot(*at[on].T, "o", ms=3.5, mfc=colour, mec=INK, mew=0.5)
+        ax.set_aspect("equal")
+        ax.autoscale_view()
+        ax.spines[:].set_visible(False)
+        ax.tick_params(length=2, color=GREY, labelcolor=GREY)
+    ax.set_title(name)
+    if bar:
+        extend = "max" if norm.vmax is not None and values.max() > norm.vmax else "neither"
+        figure.colorbar(plt.cm.ScalarMappable(norm, colours), ax=ax, shrink=0.75, pad=0.02, extend=extend)
+
+
+def norm_of(bodies: Iterable[Body], name: str) -> Normalize:
+    """One scale for several states."""
+    values = [body.fields[name] for body in bodies]
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    if name == "von Mises stress":  # corners where a support ends are singular
+        low, high = 0.0, max(float(np.percentile(v, 99)) for v in values)
+    return Normalize(low, high if high > low else low + 1e-12 + abs(low))
+
+
+def bodies(body: Body, factor: float) -> tuple[Figure, str]:
+    """The body, a panel a field."""
+    names = list(body.fields)
+    figure = plt.figure(figsize=(WIDTHS[body.dim] * len(names), 3.6), layout="compressed")
+    grid = figure.add_gridspec(1, len(names))
+    for i, name in enumerate(names):
+        panel(figure, grid[i], body, name, factor=factor, norm=norm_of([body], name))
+    said = [f"{name} {number(float(v.min()))} to {number(float(v.max()))}" for name, v in body.fields.items()]
+    points = ""
+    if len(body.points):
+        points = "; contact points: " + ", ".join(
+            f"{int((body.status == i).sum())} {name}" for i, (name, _) in enumerate(STATUS)
+        )
+        if body.dim == 2:
+            points += " (white, blue, red)"
+    shown = (
+        f"displacement {factor:g} times magnified, dashed the undeformed outline"
+        if body.dim == 2
+        else (f"displacement {factor:g} times magnified")
+    )
+    return figure, f"The body at t = {number(body.time)}, {shown}: {'; '.join(said)}{points}."
+
+
+def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, str]:
+    """What the contact feels: along the part in the plane, on it in space. Each part has `position` (n,) or (n, 2) and fields."""
+    rows = ("pressure", "friction traction", "gap", "slip")
+    figure, axes = plt.subplots(len(parts), len(rows), figsize=(12, 2.7 * len(parts)), squeeze=False)
+    for line, (part, fields) in zip(axes, parts.items(), strict=True):
+        for ax, name in zip(line, rows, strict=True):
+            x, values = fields["position"], fields[name]
+            if x.ndim == 1:
+                for i, (_, colour) in enumerate(STATUS):
+                    on = fields["status"] == i
+                    ax.plot(x[on], values[on], "o", ms=4, mfc=colour, mec=INK, mew=0.5)
+                ax.plot(x, values, "-", color=GREY, lw=0.8, zorder=0)
+                ax.axhline(0, color=GREY, lw=0.5)
+                ax.set_xlabel("along the part")
+            else:
+                shown = ax.scatter(*x.T, c=values, cmap=cm.batlow, s=14)
+                figure.colorbar(shown, ax=ax, shrink=0.8)
+                ax.set_aspect("equal")
+            ax.set_title(f"{part}: {name}")
+    largest = [f"{part} {number(float(f['pressure'].max()))}" for part, f in parts.items()]
+    return figure, (
+        f"Contact at t = {number(time)}; white points are open, blue ones stick, red ones slip. Largest pressure: "
+        f"{', '.join(largest)}."
+    )
+
+
+def history(time: Array, panels: dict[str, dict[str, Array]]) -> tuple[Figure, str]:
+    """Time series, a panel a group; the group `residuals` on a logarithmic axis."""
+    columns = min(2, len(panels))
+    lines = -(-len(panels) // columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(5.2 * columns, 2.6 * lines), squeeze=False, sharex=True)
+    for ax, (title, series) in zip(axes.flat, panels.items(), strict=False):
+        for (name, values), colour in zip(series.items(), COLOURS * 4, strict=False):
+            ax.plot(
+                time, np.where(values > 0, values, np.nan) if title == "residuals" else values, color=colour, label=name
+            )
+        if title == "residuals":
+            ax.set_yscale("log")
+        ax.set_title(title)
+        ax.legend(loc="best", fontsize=7)
+    for ax in axes.flat[len(panels) :]:
+        ax.set_visible(False)
+    for ax in axes[-1]:
+        ax.set_xlabel("t")
+    return figure, f"{len(time)} steps to t = {number(float(time[-1]))}: {', '.join(panels)}."
+
+
+def animation(
+    states: list[Body], name: str, factor: float, out: Path, progress: Callable[[int, int], None] | None = None
+) -> None:
+    """The body coloured by one field through time, as GIF."""
+    norm = norm_of(states, name)
+    figure = plt.figure(figsize=(WIDTHS[states[0].dim], 3.6), layout="compressed")
+    moved = np.concatenate([b.nodes + factor * b.u for b in states] + [states[0].nodes])
+    low, high = moved.min(axis=0), moved.max(axis=0)
+    edge = 0.03 * (high - low).max()
+    writer = PillowWriter(fps=12)
+    with writer.saving(figure, str(out), dpi=100):
+        for i, body in enumerate(states):
+            figure.clear()
+            panel(figure, figure.add_gridspec(1, 1)[0], body, name, factor=factor, norm=norm)
+            ax = figure.axes[0]
+            ax.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+            ax.set_title(f"{name}, t = {body.time:.3f}")
+            writer.grab_frame()
+            if progress:
+                progress(i + 1, len(states))
+    plt.close(figure)

@@ -1,0 +1,127 @@
+"""Figures, animation and page of a run: all there for every kind of run, and showing what was computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Command
+from PIL import Image
+
+import warmslip
+from warmslip import Scene, view
+from warmslip.export import opened
+from warmslip.view import _along, body
+
+Small = Callable[..., Scene]
+KINDS = {
+    "paper_mixed": ["mesh.n=4", "time.steps=3"],
+    "heat_slab": ["time.steps=3"],  # nothing moves
+    "elastic_drop": ["time.steps=3", "mesh.n=[1,4]"],  # no heat, nothing touches yet
+    "plate_with_hole": ["time.steps=2"],
+    "block_with_hole": ["time.steps=2"],  # in space
+}
+
+
+class Page(HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.images = 0
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if tag == "img":
+            self.images += 1
+            assert (given["src"] or "").startswith("data:image/")  # nothing else is needed to read it
+            assert given["alt"]
+
+    def handle_data(self, data: str) -> None:
+        self.words += data.split()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_run_is_drawn(name: str, tmp_path: Path) -> None:
+    done = warmslip.run(warmslip.load(name, KINDS[name]), out=tmp_path)
+    files = view.view(tmp_path, tmp_path / "view")
+    expected = [
+        "body.png",
+        *(["contact.png"] if name != "heat_slab" else []),
+        "history.png",
+        "animation.gif",
+        "report.html",
+    ]
+    assert [path.name for path in files] == expected
+    for path in files[:-1]:
+        with Image.open(path) as image:
+            assert min(image.size) > 200 and len(image.convert("L").getcolors()) > 20  # not blank
+    with Image.open(tmp_path / "view" / "animation.gif") as image:
+        assert image.n_frames == 1 + done.summary["steps"]
+    page = Page((tmp_path / "view" / "report.html").read_text())
+    assert page.images == len(expected) - 1
+    assert "right:" in page.words and done.summary["stamp"]["scene_hash"] in page.words
+    norm = next(iter(done.summary["norms"].values()))
+    assert f"{norm:.6g}" in page.words
+
+
+def test_what_is_drawn_is_what_was_computed(small: Small, tmp_path: Path) -> None:
+    states = []
+    done = warmslip.run(small(), out=tmp_path, observers=[lambda state, _: states.append((state.mises, state.contact))])
+    with opened(tmp_path) as t:
+        d = t.discretisation()
+        last = body(t, d, 4)
+        parts = view._parts(t, d, 4)
+        panels = view._history(t, d)
+    assert np.array_equal(last.fields["temperature"], done.theta)
+    assert np.allclose(last.fields["displacement"], np.linalg.norm(done.u, axis=1))
+    mises, contact = states[-1]
+    assert np.allclose(last.fields["von Mises stress"], mises, rtol=1e-12)
+    assert np.allclose(np.sort(parts["bottom"]["pressure"]), np.sort(contact["pressure"]), rtol=1e-12)
+    assert np.allclose(parts["bottom"]["position"], np.linspace(0, 1, 5))
+    assert panels["contact forces"]["normal force bottom"][-1] == pytest.approx(done.summary["contact"]["normal_force"])
+
+
+def test_a_run_that_was_stopped_is_drawn_too(small: Small, tmp_path: Path) -> None:
+    warmslip.run(small(), out=tmp_path)
+    (tmp_path / "summary.json").unlink()
+    view.view(tmp_path, tmp_path / "view", animate=False, at=0.5)
+    said = (tmp_path / "view" / "report.html").read_text()
+    assert "did not end" in said and "at t = 0.5" in said
+    assert not (tmp_path / "view" / "animation.gif").exists()
+
+
+def test_a_title_is_text_and_no_markup(small: Small, tmp_path: Path) -> None:
+    warmslip.run(small(title="<script>alert(1)</script>"), out=tmp_path)
+    view.view(tmp_path, tmp_path / "view", animate=False)
+    assert "<script>" not in (tmp_path / "view" / "report.html").read_text()
+
+
+def test_length_along_lines_open_closed_and_several() -> None:
+    circle = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 13)[:-1]])
+    edges = np.array([[i, (i + 1) % 12] for i in range(12)])
+    side = 2 * np.sin(np.pi / 12)
+    assert np.allclose(np.sort(_along(circle, edges, circle)), side * np.arange(12))
+    path, two = np.array([[0.0, 0], [1, 0], [1, 1], [5, 5], [5, 6]]), np.array([[1, 0], [1, 2], [3, 4]])
+    middle = np.array([[0.5, 0.0], [1.0, 0.25], [5.0, 5.5]])
+    assert np.allclose(_along(path, two, middle), [0.5, 1.25, 2.5])
+
+
+def test_the_command_says_what_it_wrote_and_what_it_cannot(command: Command) -> None:
+    keys = ["--set", "mesh.n=4", "--set", "time.steps=2", "--out", "run"]
+    assert command("run", "paper_mixed", *keys).returncode == 0
+    told = command("view", "run", "--out", "seen", "--at", "0.5")
+    assert told.returncode == 0 and "report.html in seen" in told.stdout
+    beyond = command("view", "run", "--out", "seen", "--at", "3")
+    assert beyond.returncode == 2 and "from t = 0 to 1, not at 3" in beyond.stderr
+    nothing = command("view", ".", "--out", "seen")
+    assert nothing.returncode == 2 and "holds no trajectory.h5" in nothing.stderr
+    some = command("export", "run", "--out", "series", "--fields", "temperature,pressure", "--times", "1.0")
+    assert some.returncode == 0 and some.stdout.startswith("1 states")
+    wrong = command("export", "run", "--out", "series", "--fields", "presure")
+    assert wrong.returncode == 2 and "did you mean 'pressure'?" in wrong.stderr
+    assert command("export", "run", "--out", "series", "--times", "soon").returncode == 2
