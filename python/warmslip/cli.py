@@ -41,6 +41,7 @@ for command in (
     cli_study.study,
     cli_study.manufactured,
     cli_study.extremes,
+    cli_study.blocks,
     cli_study.rates,
     cli_study.readings,
     cli_study.work,

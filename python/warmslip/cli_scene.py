@@ -124,7 +124,12 @@ def explain(
     from warmslip import explain as plans
 
     checked = scenes.load(scene, set_)
-    found = plans.measured(checked) if trial else plans.plan(checked)
+    if trial:
+        from warmslip import estimate
+
+        found = estimate.measured(checked)
+    else:
+        found = plans.plan(checked)
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plans.text(found))
 

@@ -100,6 +100,31 @@ def extremes(
     studies.write(_writable(out), ladders.table(checked), studies.stamp(checked))
 
 
+def blocks(
+    out: Csv,
+    explained: Annotated[
+        Path, typer.Option(help="another CSV: what `explain` says of the library and what its runs take")
+    ],
+    n: Annotated[int, typer.Option(help="bricks a side")] = 96,
+    steps: Annotated[int, typer.Option(help="time steps of every combination, a multiple of 5")] = 30,
+) -> None:
+    """Measure what every combination of blocks costs, against the whole model and against the least code."""
+    from warmslip import blocks as combined
+    from warmslip import estimate
+    from warmslip import study as studies
+
+    for path in (out, explained):
+        _writable(path)
+    stamp = studies.stamp(combined.whole(n, steps))
+    with progress_bar() as bar:
+        task = bar.add_task("combinations", total=None, note="")
+        rows = combined.table(n, steps, lambda done, total: bar.update(task, completed=done, total=total))
+        studies.write(out, rows, stamp)
+        task = bar.add_task("library", total=None, note="")
+        rows = estimate.table(progress=lambda done, total: bar.update(task, completed=done, total=total))
+        studies.write(explained, rows, studies.stamp(None))
+
+
 def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
     """Writes a table made from other tables; ValueError when those are not what they should be."""
     from warmslip import provenance

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import resource
-import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
-
-import numpy as np
 
 from warmslip.consistency import contact_keys
 from warmslip.expressions import constant
 from warmslip.scene import Scene
 from warmslip.tables import ContactTable
-
-TRIAL = 5  # steps that are taken to learn what one costs
 
 
 @dataclass(frozen=True)
@@ -30,6 +24,7 @@ class Plan:
     solver: str = ""
     setup_seconds: float = 0.0  # wall time on this machine and these ranks
     step_seconds: float = 0.0
+    output_seconds: float = 0.0  # opening and closing files, checkpoints
     seconds: float = 0.0
     memory_bytes: float = 0.0
 
@@ -205,38 +200,6 @@ def _missing(scene: Scene) -> list[str]:
     return out
 
 
-def measured(scene: Scene, *, comm: Any = None) -> Plan:
-    """The plan with what it costs here: set-up as it is, and a few trial steps times the number of steps (collective).
-
-    The run itself adds its output. Raises ValueError as a run would.
-    """
-    from warmslip.runner import Run
-
-    begin = time.perf_counter()
-    job = Run(scene, comm=comm)
-    setup = time.perf_counter() - begin
-    times, before = [], time.perf_counter()
-    for taken, _ in enumerate(job.steps(), start=1):
-        now = time.perf_counter()
-        times.append(now - before)
-        before = now
-        if taken == TRIAL:
-            break
-    step = float(np.median(times)) if times else float("nan")
-    found = plan(scene)
-    size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return replace(
-        found,
-        fields=[*found.fields, size],
-        solver=job.stepper.solver,
-        setup_seconds=setup,
-        step_seconds=step,
-        seconds=setup + scene.time.steps * step,
-        memory_bytes=float(memory),
-    )
-
-
 def text(found: Plan) -> str:
     """The plan in lines for a terminal."""
 
@@ -258,7 +221,8 @@ def text(found: Plan) -> str:
         out += block(
             "cost here",
             [
-                f"{found.seconds:.2g} s: {found.setup_seconds:.2g} s to set up, {1e3 * found.step_seconds:.3g} ms a step",
+                f"{found.seconds:.2g} s: {found.setup_seconds:.2g} s to set up, {1e3 * found.step_seconds:.3g} ms a step with "
+                f"its output, {found.output_seconds:.2g} s for files and checkpoints",
                 f"{found.memory_bytes / 1e9:.2g} GB of memory a process",
             ],
         )

@@ -39,7 +39,7 @@ def fingerprint() -> str:
     """A hash of everything that solves: the compiled core and the Python modules that step it."""
     digest = hashlib.sha256()
     compiled = sorted(PACKAGE.parent.parent.glob("build/cp*/_core.*.so")) or sorted(PACKAGE.glob("_core.*.so"))
-    afterwards = {"__init__", "rates", "readings", "work", "judge", "explain", "export", "view"}
+    afterwards = {"__init__", "rates", "readings", "work", "judge", "explain", "estimate", "export", "view", "blocks"}
     sources = sorted(p for p in PACKAGE.glob("*.py") if p.stem not in afterwards and not p.stem.startswith("cli"))
     for path in [*compiled, *sources, *sorted(PACKAGE.glob("scenes/paper_*.toml"))]:
         digest.update(path.name.encode() + path.read_bytes())

@@ -190,9 +190,14 @@ def run(
     if folder is not None and rank == 0 and job.outcome != "interrupted":
         for name in checkpoint.NAMES:  # the run is over
             (folder / name).unlink(missing_ok=True)
+    return finish(job, folder)
+
+
+def finish(job: Run, folder: Path | None) -> Result:
+    """Summary and final fields of a run as it stands, into a folder when there is one (collective)."""
     told = job.summary()
     u, w, theta = (job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta"))
-    if folder is not None and rank == 0:
+    if folder is not None and job.comm.rank == 0:
         (folder / "summary.json").write_text(json.dumps(told, indent=2) + "\n")
         mesh_io.write_vtu(folder / "final.vtu", job.discretisation, u, w, theta)
-    return Result(told, u, w, theta, path)
+    return Result(told, u, w, theta, folder / "trajectory.h5" if folder is not None else None)

@@ -218,6 +218,26 @@ rule extremes_figure:
         "warmslip draw extremes {input} --out {output.figure}"
 
 
+rule blocks_figure:
+    """What blocks cost."""
+    input:
+        "<tradeoff>/blocks.csv",
+    output:
+        figure=report(
+            "<tradeoff>/blocks.png",
+            caption=CAPTION,
+            category="7 Speed against accuracy",
+            labels={"figure": "cost of blocks"},
+        ),
+        caption="<tradeoff>/blocks.rst",
+    params:
+        code=FIGURES,
+    message:
+        "figure {output.figure}"
+    shell:
+        "warmslip draw blocks {input} --out {output.figure}"
+
+
 rule figures:
     input:
         "<paper>/figures/figure_1.png",
@@ -233,4 +253,5 @@ rule figures:
         ),
         "<paper>/figures/readings.png",
         "<tradeoff>/work.png",
+        "<tradeoff>/blocks.png",
         "<extremes>/extremes.png",

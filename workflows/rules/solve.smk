@@ -97,3 +97,28 @@ rule extremes:
         "runs at the extremes"
     shell:
         "warmslip extremes --n {params.n} --steps {params.steps} --out {output.table} > {log} 2>&1"
+
+
+rule blocks:
+    """Seconds of a step of every combination of blocks, and what `explain` says of the library against what its runs take."""
+    output:
+        table="<tradeoff>/blocks.csv",
+        stamp="<tradeoff>/blocks.json",
+        explained="<tradeoff>/explained.csv",
+        explained_stamp="<tradeoff>/explained.json",
+    log:
+        "<runs>/logs/blocks.log",
+    priority: 70
+    threads: workflow.cores  # alone, so that nothing disturbs the clock
+    resources:
+        mem_mb=1000,
+    params:
+        n=config["blocks"]["n"],
+        steps=config["blocks"]["steps"],
+        core=FINGERPRINT,
+        code=MEASURING,
+    message:
+        "cost of every combination of blocks"
+    shell:
+        "warmslip blocks --n {params.n} --steps {params.steps} --out {output.table}"
+        " --explained {output.explained} > {log} 2>&1"

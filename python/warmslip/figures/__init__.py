@@ -28,6 +28,7 @@ KINDS = {
     "table": ("maps", "the table of readings"),
     "extremes": ("maps", "the table of extremes"),
     "work": ("tradeoff", "the table of work"),
+    "blocks": ("blocks", "the table of blocks"),
     "graded": ("verification", "graded_table.csv of the verification"),
     "verdicts": ("verification", "tables of verification lines"),
 }

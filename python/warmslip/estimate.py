@@ -1,0 +1,122 @@
+"""What a scene costs on this machine, from a few trial steps."""
+
+from __future__ import annotations
+
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warmslip import checkpoint
+from warmslip.explain import Plan, plan
+from warmslip.runner import Run, finish, run
+from warmslip.scene import Scene, library, load
+from warmslip.trajectory import TrajectoryWriter
+
+FEW, MANY, LONG_ENOUGH = 5, 60, 0.3  # trial steps at least, and at most when they are quick; seconds
+
+
+@dataclass
+class Trial:
+    """Seconds of the trial steps; of storing a step with many others at once; of a checkpoint; of what a run would not do."""
+
+    steps: list[float] = field(default_factory=list)
+    storing: float = 0.0
+    checkpoint: float = 0.0
+    extra: float = 0.0
+
+    @property
+    def step(self) -> float:
+        """A step beyond the first ones, output included."""
+        return float(np.mean(self.steps[len(self.steps) // 4 :])) + self.storing
+
+
+def _timed(action: Callable[[], None]) -> float:
+    begin = time.perf_counter()
+    action()
+    return time.perf_counter() - begin
+
+
+def trial(job: Run, folder: Path) -> Trial:
+    """Takes the first steps of a run with their output into a folder (collective)."""
+    found, begin, few = Trial(), time.perf_counter(), 0.0
+    with TrajectoryWriter(folder / "trajectory.h5", job.discretisation, job.stepper, job.comm) as writer:
+        before = time.perf_counter()
+        for _, report in job.steps():
+            writer.step(report, job.taken)
+            now = time.perf_counter()
+            found.steps.append(now - before)
+            if job.taken in (FEW, 2 * FEW):  # the first time files grow their first blocks
+                few = _timed(writer.write)
+                found.extra += few
+            if job.comm.bcast(job.taken >= MANY or (job.taken >= FEW and now - begin > LONG_ENOUGH), root=0):
+                break
+            before = time.perf_counter()
+        flush, more = _timed(writer.write), job.taken - 2 * FEW
+        if more > FEW:
+            found.storing = max(0.0, (flush - few) / (more - FEW))
+        saving = _timed(lambda: checkpoint.save(folder, job))
+        found.checkpoint = flush + saving
+        found.extra += saving
+    return found
+
+
+def measured(scene: Scene, *, comm: Any = None) -> Plan:
+    """The plan with what it costs here: set-up and ending as they are, the trial steps times the number of steps (collective).
+
+    The trial steps are the first ones: contact that changes more, or less, later on costs accordingly. Raises ValueError as a
+    run would.
+    """
+    begin = time.perf_counter()
+    job = Run(scene, comm=comm)
+    setup = time.perf_counter() - begin
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        tried = trial(job, Path(folder))
+        finish(job, Path(folder))
+        output = time.perf_counter() - begin - sum(tried.steps) - tried.extra
+    output += (scene.time.steps - 1) // scene.output.checkpoint * tried.checkpoint
+    taken = len(tried.steps)
+    step = tried.step if taken else float("nan")
+    found = plan(scene)
+    size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
+    return replace(
+        found,
+        fields=[*found.fields, size],
+        solver=job.stepper.solver,
+        setup_seconds=setup,
+        step_seconds=step,
+        output_seconds=output,
+        seconds=setup + sum(tried.steps) + (scene.time.steps - taken) * step + output,
+        memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0,
+    )
+
+
+def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) -> list[dict[str, Any]]:
+    """What is said of every scene of the library and what its run takes, in seconds: medians of `repeats` of both, in turns."""
+    names, rows = library(), []
+    for i, name in enumerate(names, start=1):
+        scene = load(name)
+        said: list[float] = []
+        took: list[float] = []
+        for attempt in range(repeats + 1):
+            predicted = measured(scene).seconds
+            with tempfile.TemporaryDirectory() as folder:
+                begin = time.perf_counter()
+                run(scene, out=folder)
+                found = time.perf_counter() - begin
+            if attempt:  # the first one loads libraries
+                said.append(predicted)
+                took.append(found)
+        middle, real = float(np.median(said)), float(np.median(took))
+        rows.append(
+            {"scene": name, "steps": scene.time.steps, "said": middle, "took": real, "said_over_took": middle / real}
+        )
+        if progress:
+            progress(i, len(names))
+    return rows

@@ -1,0 +1,65 @@
+"""Every combination of blocks does the solves of the blocks it has and no others; its floor gives the same numbers."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Command
+
+from warmslip import blocks, estimate
+from warmslip.runner import Run
+
+FULL = blocks.whole(4, 10)
+ALL = list(blocks.combinations())
+
+
+def test_all_that_make_sense_once() -> None:
+    assert len(ALL) == len({tuple(one.values()) for one in ALL}) == 110
+    assert len({blocks.scene(FULL, one).digest() for one in ALL}) == 110
+    whole = {"motion": "viscoelastic", "contact": "friction", "heat": "both", "exchange": "exchange"}
+    assert blocks.scene(FULL, whole) == FULL
+
+
+@pytest.mark.parametrize("chosen", ALL, ids=["; ".join(one.values()) for one in ALL])
+def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
+    job = Run(blocks.scene(FULL, chosen))
+    floor = blocks.Floor(job)
+    for _ in job.steps():
+        floor.step()
+    assert job.outcome == "right" and job.taken == 10
+    cost, fields = job.stepper.cost, [chosen["motion"] != "none", chosen["heat"] != "none"]
+    assert (cost.substitutions, cost.factorizations, cost.refinements) == (10 * sum(fields), sum(fields), 0)
+    assert (cost.newton_iterations > 0) == (chosen["contact"] != "none")
+    assert (cost.momentum_seconds > 0, cost.heat_seconds > 0) == tuple(fields)
+    if chosen["contact"] == "none":
+        assert cost.contact_seconds == 0 and len(job.discretisation.surface.weights) == 0
+        k = FULL.step
+        for name, factor in (("u", 1.0), ("w", k), ("theta", 1.0)):  # a velocity that dies out is the rounding of u / k
+            exact, found = getattr(job.stepper, name), getattr(floor, name)
+            assert (exact is None) == (found is None)
+            if exact is not None:
+                size = np.abs(exact.array if name == "theta" else job.stepper.u.array).max()
+                assert factor * np.abs(exact.array - found.array).max() <= 1e-13 * size > 0, name
+
+
+def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estimate, "library", lambda: ["heat_slab"])
+    (row,) = estimate.table(repeats=1)
+    assert row["scene"] == "heat_slab" and row["said"] > 0 and row["took"] > 0
+    monkeypatch.setattr(blocks, "combinations", lambda: iter(ALL[-2:]))
+    rows = blocks.table(4, 10)
+    assert all(r["over_floor"] > 0 and r["absent"] > 0 and r["unknowns"] == 75 for r in rows)
+    wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
+    assert wrong.returncode == 2 and "no multiple of 5" in wrong.stderr
+
+
+def test_committed_table() -> None:
+    """What is committed covers every combination, and its counts are those of the blocks that are there."""
+    path = Path(__file__).parents[2] / "results/tradeoff/blocks.csv"
+    rows = list(csv.DictReader(path.open()))
+    assert [{key: row[key] for key in ALL[0]} for row in rows] == ALL
+    for row in rows:
+        assert float(row["substitutions"]) == (row["motion"] != "none") + (row["heat"] != "none")
