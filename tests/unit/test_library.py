@@ -27,6 +27,9 @@ PINNED = {
     "two_materials": ("u_V", 0.06233801862),
     "plate_with_hole": ("theta_L2", 2.363267372),
     "block_with_hole": ("u_V", 0.088526593),
+    "creep_column": ("u_L2", 0.3169927902),
+    "hertz": ("u_V", 0.1942569468),
+    "wavy_road": ("w_L2", 0.00477215511),
 }
 LARGE = {"paper_printed", "paper_mixed", "paper_isotropic", "paper_consistent", "block_3d"}  # the studies run them
 
@@ -203,3 +206,39 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, name
         summaries.append(json.loads((tmp_path / f"run{ranks}/summary.json").read_text()))
     assert summaries[1]["norms"] == pytest.approx(summaries[0]["norms"], rel=1e-9)
     assert summaries[1]["contact"]["normal_force"] == pytest.approx(summaries[0]["contact"]["normal_force"], rel=1e-9)
+
+
+def test_the_column_creeps_as_its_two_exponentials_say() -> None:
+    """The contact force at the end is the essay's, and the touch is where Kelvin-Voigt's column reaches the gap."""
+    job = warmslip.Run(warmslip.load("creep_column"))
+    force = [report.normal_force for _, report in job.steps()]
+    young, height, stiffness, gap, traction = 3.0, 2.0, 7.0, 0.3, 1.2
+    final = stiffness * (height * (traction + stiffness * gap) / (young + stiffness * height) - gap)
+    assert final == pytest.approx(0.618, abs=5e-4)  # as its essay says
+    assert force[-1] == pytest.approx(final, rel=1e-11)
+    touch = -0.5 * np.log(1 - gap / height / (traction / young))
+    assert job.scene.step * np.count_nonzero(np.array(force) == 0) == pytest.approx(touch, abs=0.05)
+
+
+def test_the_cylinder_presses_as_hertz_says() -> None:
+    """From a block of finite size: peak pressure and half-width belong to the force within a hundredth."""
+    job = warmslip.Run(warmslip.load("hertz"))
+    for state, report in job.steps():
+        pressure, force = state.contact["pressure"], report.normal_force
+    peak = np.sqrt(force / (1 - 0.3**2) / (np.pi * 4.0))
+    x, weights = (
+        np.asarray(job.discretisation.surface.positions)[:, 0] - 6,
+        np.asarray(job.discretisation.surface.weights),
+    )
+    width = 2 * np.sqrt((weights * pressure) @ x**2 / force)
+    assert pressure.max() == pytest.approx(peak, rel=1e-2)
+    assert width == pytest.approx(2 * force / (np.pi * peak), rel=1e-2)
+
+
+def test_the_waves_shake_the_body_and_do_not_drag_it() -> None:
+    job = warmslip.Run(warmslip.load("wavy_road"))
+    touching = []
+    for state, report in job.steps():
+        assert np.abs(state.contact["friction traction"]).max() == 0
+        touching.append(report.stick + report.slip)
+    assert min(touching[10:]) > 0 and max(touching[10:]) < len(state.contact["gap"])  # always in part
