@@ -25,6 +25,7 @@ def problems(scene: Scene) -> list[str]:
         *_blocks(scene),
         *_regions(scene),
         *_time(scene),
+        *_plane(scene),
     ]
 
 
@@ -229,3 +230,38 @@ def _regions(scene: Scene) -> Iterator[str]:
 def _time(scene: Scene) -> Iterator[str]:
     if scene.step < SHORTEST:
         yield f"time: a step of {scene.step:g} is too short to divide by; take fewer steps or a later end"
+
+
+def _plane(scene: Scene) -> Iterator[str]:
+    """Formulas of z where there is none."""
+    if scene.mesh.dim == 3:
+        return
+    for key, value in formulas(scene.resolved()):
+        try:
+            if "z" in Expression(value).names:
+                yield f"{key}: '{value}' has a z, and the body lies in the plane of x and y; leave it out"
+        except ValueError:
+            continue  # refused elsewhere
+
+
+# tables whose texts are formulas, but for names
+FORMULAS = ("loads", "supports", "initial", "contact", "heat", "regions")
+NAMES = ("part", "quadrature", "assumption")
+
+
+def formulas(tables: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Every formula of a resolved scene with its key."""
+    for table in FORMULAS:
+        yield from _texts(table, tables.get(table))
+
+
+def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict):
+        for name, one in value.items():
+            if name not in NAMES:
+                yield from _texts(f"{key}.{name}", one)
+    elif isinstance(value, list) and key not in ("supports.displacement", "supports.temperature"):
+        for i, one in enumerate(value):
+            yield from _texts(f"{key}.{i}", one)
+    elif isinstance(value, str):
+        yield key, value

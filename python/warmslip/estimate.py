@@ -14,6 +14,7 @@ import numpy as np
 
 from warmslip import checkpoint
 from warmslip.explain import Plan, plan
+from warmslip.problem import cell_regions
 from warmslip.runner import Run, finish, run
 from warmslip.scene import Scene, library, load
 from warmslip.trajectory import TrajectoryWriter
@@ -84,10 +85,15 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     taken = len(tried.steps)
     step = tried.step if taken else float("nan")
     found = plan(scene)
+    mesh = job.discretisation.mesh
+    count = np.bincount(cell_regions(scene, mesh), minlength=1 + len(scene.regions))
+    regions = [
+        f"region '{name}': {n} of {len(mesh.cells)} cells" for name, n in zip(scene.regions, count[1:], strict=True)
+    ]
     size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
     return replace(
         found,
-        fields=[*found.fields, size],
+        fields=[*found.fields, size, *regions],
         solver=job.stepper.solver,
         setup_seconds=setup,
         step_seconds=step,

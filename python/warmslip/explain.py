@@ -176,6 +176,8 @@ def _missing(scene: Scene) -> list[str]:
     for c in scene.contacts:
         if c.stiffness is not None and c.friction is None:
             out.append(f"no friction on '{c.part}': it slides freely")
+        if isinstance(c.gap, float) and c.gap < 0:
+            out.append(f"the gap of '{c.part}' is negative: the body starts inside the foundation")
         if scene.heat is not None and c.heat_exchange is None:
             out.append(f"no heat exchange on '{c.part}': the foundation is insulated")
     if scene.moves and scene.elasticity is None:

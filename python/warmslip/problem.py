@@ -12,8 +12,9 @@ from warmslip import _core, mesh_files
 from warmslip.expressions import Expression
 from warmslip.laws import Law
 from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
+from warmslip.refinement import refined
 from warmslip.scene import FullScene, Scene
-from warmslip.tables import ContactTable, IsotropicTable, RegionTable
+from warmslip.tables import ContactTable, IsotropicTable, MeshTable, RegionTable
 
 COUPLINGS = ("expansion", "heating")
 log = logging.getLogger(__name__)
@@ -38,12 +39,16 @@ def _matrix(value: Any, dim: int) -> Array:
     return np.array(value, dtype=float) if isinstance(value, list) else value * np.eye(dim)
 
 
+def _read(table: MeshTable) -> mesh_files.MeshFile:
+    return refined(mesh_files.read(str(table.file)), table.refine)
+
+
 def make_mesh(scene: Scene) -> Any:
     """The scene's mesh as a `_core.Mesh2` or `_core.Mesh3`."""
     table = scene.mesh
     kind = _d("Mesh", table.dim)
     if table.file is not None:
-        read = mesh_files.read(table.file)
+        read = _read(table)
         return kind.from_lists(read.nodes, read.cells, read.parts)
     mesh = kind.box(table.counts, table.sides, getattr(_core.Diagonal, table.diagonal))
     if table.grading is None:
@@ -76,20 +81,29 @@ def _materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
             capacity=heat.capacity if heat is not None else 1.0,
         )
 
-    materials = [material(None), *(material(region) for region in scene.regions.values())]
+    return [material(None), *(material(region) for region in scene.regions.values())], cell_regions(
+        scene, mesh
+    ).tolist()
+
+
+def cell_regions(scene: Scene, mesh: Any) -> Any:
+    """The number of the region of every cell, in the order of the scene, 0 for the rest: (cells,), or () without regions.
+
+    Raises ValueError for a region without cells.
+    """
     if not scene.regions:
-        return materials, []
+        return np.empty(0, dtype=int)
     numbers = np.zeros(len(mesh.cells), dtype=int)
     centroids = np.asarray(mesh.nodes)[np.asarray(mesh.cells)].mean(axis=1)
     for i, (name, region) in enumerate(scene.regions.items(), start=1):
         if region.where is None:
-            cells = mesh_files.read(str(scene.mesh.file)).regions[name]
+            cells = _read(scene.mesh).regions[name]
         else:
             cells = np.flatnonzero(Expression(region.where)(centroids, 0.0))
         if len(cells) == 0:
             raise ValueError(f"regions.{name}: no cell lies in it; correct its `where`")
         numbers[cells] = i
-    return materials, numbers.tolist()
+    return numbers
 
 
 def contact_part(contact: ContactTable, own: Law | None = None) -> Any:

@@ -109,7 +109,12 @@ class Run:
         Ends before a step that is not right, whose state is not kept: see `outcome` and `failure`. Collective.
         """
         for n in range(self.taken + 1, self.scene.time.steps + 1):
-            report = self.stepper.advance(*self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step))
+            try:
+                loads = self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step)
+            except ValueError as error:  # a formula that gives no finite number; on every rank
+                self.outcome, self.failure = "data_not_finite", {"step": n, "reason": str(error)}
+                return
+            report = self.stepper.advance(*loads)
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
             if report.outcome != _core.Outcome.right:
@@ -153,9 +158,9 @@ def run(
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
-    right, contact_not_converged, not_finite, identity_violated, precision_lost, solver_failed (`failure` in the summary has the
-    step that was not taken), and interrupted after Ctrl-C or SIGTERM, which leave a checkpoint. Raises ValueError for a scene,
-    loads or laws that make no sense, OSError when `out` cannot be written.
+    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), identity_violated, precision_lost, solver_failed
+    (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or SIGTERM, which leave a checkpoint.
+    Raises ValueError for a scene, loads or laws that make no sense, OSError when `out` cannot be written.
     """
     folder = Path(out) if out is not None else None
     if folder is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -193,6 +194,10 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
+        if re.search(r"^\s*\[contact\]", text, re.M) and re.search(r"^\s*\[\[contact\]\]", text, re.M):
+            raise SceneError(
+                "contact: [contact] is one part, [[contact]] one of several; write [[contact]] for each"
+            ) from None
         raise SceneError(f"scene '{scene}' is not valid TOML: {error}; correct that line") from None
     for item in overrides or []:
         key, equals, value = item.partition("=")

@@ -53,6 +53,7 @@ class MeshTable(Table):
     grading: list[Positive] | None = None  # default: 1 along every axis
     diagonal: Literal["right", "left", "crisscross"] = "right"
     file: str | None = None  # .msh with physical names, beside the scene file
+    refine: Annotated[int, Field(ge=0, le=6, strict=True)] = 0  # times that the cells of a file are halved
 
     @property
     def dim(self) -> int:
@@ -89,11 +90,15 @@ class MeshTable(Table):
     def _sizes(self) -> Self:
         if self.file is not None:
             fields = type(self).model_fields
-            given = [key for key in fields if key != "file" and getattr(self, key) != fields[key].default]
+            given = [
+                key for key in fields if key not in ("file", "refine") and getattr(self, key) != fields[key].default
+            ]
             if given:
                 raise ValueError(f"a mesh from a file has no {', '.join(given)}; remove that, or the file")
             mesh_files.read(self.file)  # refuses
             return self
+        if self.refine:
+            raise ValueError("refine is for a mesh from a file; give a larger n")
         body = self.shape or "square"
         for key in ("n", "lengths", "grading"):
             value = getattr(self, key)

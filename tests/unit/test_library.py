@@ -14,7 +14,7 @@ import pytest
 from conftest import Command
 
 import warmslip
-from warmslip import explain, study
+from warmslip import estimate, explain, study
 from warmslip.scene import library
 
 # one number of each, regression: norm of the last state, or what its essay promises
@@ -242,3 +242,10 @@ def test_the_waves_shake_the_body_and_do_not_drag_it() -> None:
         assert np.abs(state.contact["friction traction"]).max() == 0
         touching.append(report.stick + report.slip)
     assert min(touching[10:]) > 0 and max(touching[10:]) < len(state.contact["gap"])  # always in part
+
+
+def test_what_a_plan_counts_and_warns_of() -> None:
+    found = estimate.measured(warmslip.load("two_materials"))
+    assert any(line.startswith("region 'insert': ") and line.endswith("of 512 cells") for line in found.fields)
+    sunk = explain.plan(warmslip.load("quasistatic_punch").override(**{"contact.gap": -0.01}))
+    assert "the gap of 'bottom' is negative: the body starts inside the foundation" in sunk.missing

@@ -193,8 +193,9 @@ def test_a_formula_that_fails_at_some_time_keeps_what_was_computed(tmp_path: Pat
     scene = load("paper_mixed").override(
         **{"mesh.n": 4, "time.steps": 8, "loads.body": ["log(0.6 - t)", 0.0], "output.every": 1}
     )
-    with pytest.raises(ValueError, match=r"loads\.body is not finite at t = 0\.625"):
-        warmslip.run(scene, out=tmp_path)
+    done = warmslip.run(scene, out=tmp_path)
+    assert done.outcome == "data_not_finite"
+    assert done.summary["failure"]["reason"].startswith("loads.body is not finite at t = 0.625")
     with warmslip.Trajectory(tmp_path / "trajectory.h5") as t:
         assert t.time[-1] == 0.5
 
@@ -203,6 +204,22 @@ def test_constant_formulas_are_assembled_once() -> None:
     assert not Loads.of(load("paper_mixed").override(**{"loads.body": ["x", 0.0]})).body.of_time
     assert Formula((Expression("t"), Expression("x"))).of_time
     assert evaluate(Formula((Expression("x"),)), np.ones((3, 2)), 0.0, 1).shape == (3, 1)
+
+
+def test_there_is_no_z_in_the_plane() -> None:
+    keys = {"loads.body": ["z", 0.0], "contact.gap": "0.1 * z", "supports.displacement": {"top": ["z * t", 0.0]}}
+    with pytest.raises(SceneError) as refused:
+        load("paper_mixed").override(**keys)
+    said = str(refused.value).splitlines()
+    assert [line.split(":")[0] for line in said] == ["loads.body.0", "supports.displacement.top.0", "contact.gap"]
+    assert all("has a z, and the body lies in the plane" in line for line in said)
+    load("block_3d").override(**{"contact.gap": "0.1 * z"})
+
+
+def test_one_contact_or_several(tmp_path: Path) -> None:
+    (tmp_path / "both.toml").write_text("[contact]\npart = 'bottom'\n[[contact]]\npart = 'left'\n")
+    with pytest.raises(SceneError, match=r"write \[\[contact\]\] for each"):
+        load(tmp_path / "both.toml")
 
 
 # ---- mesh files ------------------------------------------------------------------------------------------------------------
