@@ -146,13 +146,21 @@ class Expression:
         return f"Expression({self.text!r})"
 
 
+def finite(value: float) -> bool:
+    """Whether a number is finite as a float: integers may be too long for one."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
 def _checked(value: Any) -> Any:
     if isinstance(value, str):
         Expression(value)
     elif isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{value!r} is neither a number nor a formula in quotes; give one")
-    elif not math.isfinite(value):
-        raise ValueError(f"{value} is not a finite number; give one")
+    elif not finite(value):
+        raise ValueError(f"{str(value)[:20]} is not a finite number; give one")
     return value
 
 

@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import json
 import re
+import reprlib
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -282,11 +283,11 @@ def _sentence(error: Any) -> str:
             message = str(error["ctx"]["error"])
             return message if key == "scene" else f"{key}: {message}"
         case "model_type":
-            return f"{key} is a table, not {given!r}; its keys are {', '.join(_allowed(where))}"
+            return f"{key} is a table, not {reprlib.repr(given)}; its keys are {', '.join(_allowed(where))}"
         case "finite_number":
             return f"{key}: {given} is not a finite number; give one"
         case _:
-            return f"{key} = {given!r}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
+            return f"{key} = {reprlib.repr(given)}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
 
 
 def _allowed(where: list[str]) -> list[str]:
