@@ -31,11 +31,14 @@ def test_stubs_name_everything_in_the_core() -> None:
         assert not missing, f"the stubs of {name} lack {missing}"
 
 
-def test_readme_example_runs(
+def test_readme_examples_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    code, law = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     monkeypatch.chdir(tmp_path)
+    exec(compile(law, "README.md", "exec"), {})
+    outcome, force = capsys.readouterr().out.split()
+    assert outcome == "right" and float(force) > 0.1
     exec(compile(code, "README.md", "exec"), {})
     said = capsys.readouterr().out.splitlines()
     assert said[-2].startswith("right {'energy'")
