@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import Command, child_environment
 
@@ -80,3 +82,40 @@ def test_a_load_that_fails_on_one_rank_stops_both(tmp_path: Path) -> None:
         command, env=child_environment(), text=True, capture_output=True, timeout=120, cwd=tmp_path, check=True
     )
     assert result.stdout.count("data_not_finite: loads.body is not finite at t = 0.666667") == 2
+
+
+OBSERVING = """
+import numpy as np
+import warmslip
+
+found = []
+def observer(state, report):
+    contact = state.contact
+    norms = np.linalg.norm(state.u), np.linalg.norm(state.theta)
+    numbers = *norms, state.mises.max(), contact["pressure"].sum(), contact["gap"].min()
+    found.append([float(number) for number in numbers])
+
+law = warmslip.Law(compliance=lambda r: (10 * r, 10.0, 5 * r**2))
+scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 3})
+done = warmslip.run(scene, laws={"bottom": law}, observers=[observer])
+assert done.right
+from mpi4py import MPI
+everyone = MPI.COMM_WORLD.allgather(found)
+assert all(one == everyone[0] for one in everyone)
+if MPI.COMM_WORLD.rank == 0:
+    print(found)
+"""
+
+
+@pytest.mark.mpi
+def test_states_and_laws_are_the_same_on_any_number_of_ranks(tmp_path: Path) -> None:
+    (tmp_path / "observing.py").write_text(OBSERVING)
+    told = []
+    for ranks in (1, 2):
+        command = ["mpirun", "-n", str(ranks), sys.executable, str(tmp_path / "observing.py")]
+        result = subprocess.run(
+            command, env=child_environment(), text=True, capture_output=True, timeout=120, cwd=tmp_path, check=True
+        )
+        told.append(np.array(json.loads(re.findall(r"\[\[.*\]\]", result.stdout)[0])))
+    assert told[0].shape == (3, 5) and (told[0][:, :4] > 0).all()
+    assert told[1] == pytest.approx(told[0], rel=1e-10, abs=1e-13)
