@@ -42,7 +42,8 @@ def study(
     scene: SceneName,
     out: Csv,
     levels: Annotated[
-        str, typer.Option(help="bricks along the first axis, and steps, of the members")
+        str,
+        typer.Option(help="bricks along the first axis, and steps; of a file, pieces of an edge and of a step: 1,2,4"),
     ] = "16,32,64,128",
     reference: Annotated[int, typer.Option(help="bricks and steps of the solution taken as exact")] = 256,
     grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
@@ -58,13 +59,13 @@ def study(
     studies.members(sizes, reference, grid)  # refuses before anything is computed
     _writable(out)
     with progress_bar() as bar:
-        task = bar.add_task(out.stem, total=reference, note="")
+        task = bar.add_task(out.stem, total=None, note="")
         rows = studies.study(
             checked,
             levels=sizes,
             reference=reference,
             grid=grid,
-            progress=lambda n, _: bar.update(task, completed=n),
+            progress=lambda n, total: bar.update(task, completed=n, total=total),
         )
     studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid))
 

@@ -53,9 +53,9 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
     report, moves = job.report, d.problem.moves
     return (
         {
-            "n": job.scene.mesh.counts[0],
+            "n": job.scene.mesh.level,
             "steps": job.scene.time.steps,
-            "h": 1 / job.scene.mesh.counts[0],
+            "h": 1 / job.scene.mesh.level,
             "k": job.scene.step,
         }
         | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
@@ -94,24 +94,20 @@ def study(
 ) -> list[dict[str, Any]]:
     """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
 
-    A level is the number of bricks along the first axis, and of steps; the other axes keep their ratio to it. Numbers of a field
-    that the scene does not have are 0.
+    A level is the number of bricks along the first axis, and of steps; the other axes keep their ratio to it. For a mesh from a
+    file it is 1, 2, 4, ..: into how many pieces an edge is cut, and how many times the scene's steps are taken; h is then
+    relative to the file's. Numbers of a field that the scene does not have are 0.
 
     Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
     Raises RuntimeError naming the member when a run does not end right.
     """
-    if scene.mesh.file is not None:
-        raise SceneError("mesh.file: a mesh from a file cannot be refined in a study; use a square or a cube")
     if any(ratio != 1 for ratio in scene.mesh.grading or []):
         raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
-    counts = scene.mesh.counts
-    if uneven := [n for n in levels if any(n * count % counts[0] for count in counts)]:
-        raise SceneError(f"mesh.n = {counts}: level {uneven[0]} cannot keep the ratio of the axes; give other levels")
+    pace = scene.time.steps if scene.mesh.file is not None else 1
     meshes: dict[int, Discretisation] = {}
 
     def job(n: int, steps: int) -> Run:
-        axes = [n * count // counts[0] for count in counts]
-        one = scene.override(**{"mesh.n": n if len(set(axes)) == 1 else axes, "time.steps": steps})
+        one = scene.override(**_mesh(scene, n), **{"time.steps": pace * steps})
         if n not in meshes:
             meshes[n] = discretise(one)
         return Run(one, discretisation=replace(meshes[n], scene=one))
@@ -121,22 +117,35 @@ def study(
     compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
     steps = {id(run): run.steps() for run, _ in runs}
     marching = finest.steps()
-    for n in range(1, reference + 1):
+    for n in range(1, pace * reference + 1):
         _next(marching, finest)
         for run, largest in runs:
-            if n % (reference // run.scene.time.steps) == 0:
+            if n % (pace * reference // run.scene.time.steps) == 0:
                 _next(steps[id(run)], run)
-                largest.add(compare[run.scene.mesh.counts[0]].difference(run.stepper, finest.stepper))
+                largest.add(compare[run.scene.mesh.level].difference(run.stepper, finest.stepper))
         if progress:
-            progress(n, reference)
+            progress(n, pace * reference)
     return [*(row(run, largest.values) for run, largest in runs), row(finest, None)]
+
+
+def _mesh(scene: Scene, level: int) -> dict[str, Any]:
+    """The key of the mesh of a level. Raises SceneError for a level that this mesh does not have."""
+    if scene.mesh.file is not None:
+        if level & (level - 1):
+            raise SceneError(f"a mesh from a file is halved: level {level} is no power of two; give 1,2,4,..")
+        return {"mesh.refine": level.bit_length() - 1}
+    counts = scene.mesh.counts
+    if any(level * count % counts[0] for count in counts):
+        raise SceneError(f"mesh.n = {counts}: level {level} cannot keep the ratio of the axes; give other levels")
+    axes = [level * count // counts[0] for count in counts]
+    return {"mesh.n": level if len(set(axes)) == 1 else axes}
 
 
 def _next(steps: Any, run: Run) -> None:
     if next(steps, None) is None:
         m = run.scene
         raise RuntimeError(
-            f"the run with n = {m.mesh.n}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}"
+            f"the run with n = {m.mesh.level}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}"
         )
 
 

@@ -83,6 +83,11 @@ class MeshTable(Table):
         return [self.n] * self.dim if isinstance(self.n, int) else self.n
 
     @property
+    def level(self) -> int:
+        """1/h: bricks along the first axis, or how often the edges of a file are cut."""
+        return 2**self.refine if self.file is not None else self.counts[0]
+
+    @property
     def sides(self) -> list[float]:
         return self.lengths or [1.0] * self.dim
 
