@@ -14,7 +14,7 @@ import numpy as np
 
 from warmslip import checkpoint
 from warmslip.explain import Plan, plan
-from warmslip.problem import cell_regions
+from warmslip.materials import cell_regions
 from warmslip.runner import Run, finish, run
 from warmslip.scene import Scene, library, load
 from warmslip.trajectory import TrajectoryWriter

@@ -26,7 +26,7 @@ import numpy as np
 import sympy as sp
 
 from warmslip.loads import Array, Loads
-from warmslip.problem import mandel
+from warmslip.materials import mandel
 from warmslip.scene import FullScene
 from warmslip.tables import PARTS
 

@@ -9,7 +9,7 @@ import pytest
 
 import warmslip
 from warmslip import _core, mesh_files, study
-from warmslip.problem import make_mesh
+from warmslip.materials import make_mesh
 from warmslip.refinement import refined
 
 FILES = ["plate_with_hole.msh", "block_with_hole.msh"]

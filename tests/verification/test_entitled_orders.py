@@ -11,7 +11,8 @@ import pytest
 
 import warmslip
 from warmslip import _core, rates
-from warmslip.problem import discretise, make_mesh
+from warmslip.materials import make_mesh
+from warmslip.problem import discretise
 from warmslip.verify import graded, grading, uncertainty
 from warmslip.verify.corners import corner_exponents, elastic_exponent, thermal_exponent
 

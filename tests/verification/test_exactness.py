@@ -9,7 +9,7 @@ import pytest
 
 import warmslip
 from warmslip import Loads, Run, Scene
-from warmslip.problem import mandel
+from warmslip.materials import mandel
 
 NORMALS = {
     2: {"left": [-1, 0], "right": [1, 0], "top": [0, 1]},

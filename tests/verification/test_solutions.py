@@ -274,7 +274,7 @@ def test_a_body_at_rest_is_exact() -> None:
 def test_a_distorted_mesh_keeps_its_box() -> None:
     scene = setting(3, {"mesh.n": 3})
     x = np.asarray(distorted(scene).nodes)
-    straight = np.asarray(warmslip.problem.make_mesh(scene).nodes)
+    straight = np.asarray(warmslip.materials.make_mesh(scene).nodes)
     assert np.abs(x - straight).max() > 0.05
     for axis in range(3):
         for side in (0.0, 1.0):

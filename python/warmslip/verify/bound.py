@@ -49,7 +49,7 @@ from scipy.integrate import trapezoid
 import warmslip
 from warmslip.loads import Array, evaluate
 from warmslip.manufactured import errors, slipping
-from warmslip.problem import make_mesh
+from warmslip.materials import make_mesh
 from warmslip.rates import least_squares
 from warmslip.runner import Run
 from warmslip.scene import FullScene

@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 
 from warmslip import rates
 from warmslip.errors import TERMS, Comparison, Largest
-from warmslip.problem import Discretisation, discretise, make_mesh
+from warmslip.materials import make_mesh
+from warmslip.problem import Discretisation, discretise
 from warmslip.runner import IDENTITIES, residuals, worse
 from warmslip.scene import FullScene
 from warmslip.verify.corners import corner_exponents

@@ -14,7 +14,8 @@ import numpy as np
 
 from warmslip import _core
 from warmslip.loads import Array
-from warmslip.problem import Discretisation, discretise, make_mesh
+from warmslip.materials import make_mesh
+from warmslip.problem import Discretisation, discretise
 from warmslip.runner import Run
 from warmslip.scene import FullScene
 from warmslip.verify.line import Line, below

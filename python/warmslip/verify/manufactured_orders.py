@@ -14,7 +14,7 @@ import numpy as np
 
 from warmslip import rates
 from warmslip.manufactured import derive, errors
-from warmslip.problem import make_mesh
+from warmslip.materials import make_mesh
 from warmslip.runner import Run
 from warmslip.scene import FullScene
 from warmslip.symbolic import Description, Manufactured

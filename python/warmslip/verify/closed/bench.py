@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from warmslip.loads import Array, Loads
-from warmslip.problem import discretise, mandel
+from warmslip.materials import mandel
+from warmslip.problem import discretise
 from warmslip.runner import Run
 from warmslip.scene import FullScene, build_full
 from warmslip.tables import IsotropicTable
