@@ -101,7 +101,7 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     for name in ("verdict.json", "rates.csv", "readings.csv", "manufactured.csv", "figures/figure_1.png"):
         assert (paper / name).stat().st_size > 0
     pictures = sorted((tmp_path / "results/runs/ci").rglob("*.png"))
-    assert len(pictures) == 1 + 6 * len(READINGS) + 3
+    assert len(pictures) == 1 + 6 * len(READINGS) + 4
     assert all(picture.stat().st_size < 2**20 for picture in pictures)
     assert all(picture.with_suffix(".rst").read_text().strip() for picture in pictures)
 
@@ -117,7 +117,7 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     )
     other = plan(snakemake("--dry-run", "--quiet", "rules", *small, PYTHONPATH=str(tmp_path / "other")))
     everything = plan(snakemake("--dry-run", "--quiet", "rules", "--forceall", *small))
-    solves = ("study", "run", "manufactured", "extremes")
+    solves = ("study", "run", "manufactured", "extremes", "blocks")
     assert {rule: other.get(rule) for rule in solves} == {rule: everything[rule] for rule in solves}
 
     report = snakemake("--report", "report.html", *small)

@@ -221,7 +221,7 @@ rule extremes_figure:
 rule blocks_figure:
     """What blocks cost."""
     input:
-        "<tradeoff>/blocks.csv",
+        "<runs>/blocks.csv",
     output:
         figure=report(
             "<tradeoff>/blocks.png",

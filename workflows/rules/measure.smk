@@ -55,17 +55,26 @@ rule publish:
         stamps=expand("<runs>/studies/{case}.json", case=CASES),
         manufactured=["<runs>/manufactured.csv", "<runs>/manufactured.json"],
         extremes=["<runs>/extremes.csv", "<runs>/extremes.json"],
+        blocks=expand(
+            "<runs>/{name}.{kind}", name=["blocks", "explained"], kind=["csv", "json"]
+        ),
     output:
         studies=expand("<paper>/studies/{case}.csv", case=CASES),
         stamps=expand("<paper>/studies/{case}.json", case=CASES),
         manufactured=["<paper>/manufactured.csv", "<paper>/manufactured.json"],
         extremes=["<extremes>/extremes.csv", "<extremes>/extremes.json"],
+        blocks=expand(
+            "<tradeoff>/{name}.{kind}",
+            name=["blocks", "explained"],
+            kind=["csv", "json"],
+        ),
     message:
         "tables and their stamps to where they are committed"
     shell:
         "cp {input.studies} {input.stamps} $(dirname {output.studies[0]})"
         " && cp {input.manufactured} $(dirname {output.manufactured[0]})"
         " && cp {input.extremes} $(dirname {output.extremes[0]})"
+        " && cp {input.blocks} $(dirname {output.blocks[0]})"
 
 
 rule tables:

@@ -102,10 +102,10 @@ rule extremes:
 rule blocks:
     """Seconds of a step of every combination of blocks, and what `explain` says of the library against what its runs take."""
     output:
-        table="<tradeoff>/blocks.csv",
-        stamp="<tradeoff>/blocks.json",
-        explained="<tradeoff>/explained.csv",
-        explained_stamp="<tradeoff>/explained.json",
+        table="<runs>/blocks.csv",
+        stamp="<runs>/blocks.json",
+        explained="<runs>/explained.csv",
+        explained_stamp="<runs>/explained.json",
     log:
         "<runs>/logs/blocks.log",
     priority: 70
