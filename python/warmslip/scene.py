@@ -32,6 +32,7 @@ class Scene(t.Table):
     """A whole scene. Tables are blocks of the problem, and what is absent costs nothing; keys are those of the TOML file."""
 
     title: str = ""
+    """One line that says what the scene is."""
     mesh: t.MeshTable
     time: t.TimeTable
     inertia: t.InertiaTable | None = None
