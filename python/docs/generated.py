@@ -10,7 +10,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 PACKAGE, HEADERS = ROOT / "python" / "warmslip", ROOT / "cpp" / "include" / "warmslip"
-MET = ("StepReport2", "Ledger", "Cost", "Stepper2", "Operators2", "Factor")  # objects of the core that a user meets
+MET = ("StepReport2", "Cost", "Stepper2", "Operators2", "Factor")  # objects of the core that a user meets
 
 
 def essay(text: str) -> Any:
@@ -45,11 +45,13 @@ def _kind(schema: dict[str, Any]) -> str:
     if "enum" in schema:
         return ", ".join(f'`"{one}"`' for one in schema["enum"])
     match schema.get("type"):
+        case "array" if schema["items"].get("type") == "array":
+            return "matrix"
         case "array":
             most, least = schema.get("maxItems"), schema.get("minItems")
             count = f"{least} to {most} " if most != least else f"{most} " if most else ""
             inner = _kind(schema["items"])
-            return f"list of {count}({inner})" if " or " in inner or " of " in inner else f"list of {count}{inner}"
+            return f"list of {count}({inner})" if " or " in inner else f"list of {count}{inner}"
         case "object":
             return f"table: name = {_kind(schema['additionalProperties'])}"
         case "integer":
@@ -114,6 +116,7 @@ def scene() -> str:
 def commands() -> str:
     """Every command with its arguments and options, from the program itself."""
     import typer
+
     from warmslip.cli import app
 
     group: Any = typer.main.get_command(app)
@@ -152,11 +155,20 @@ def core() -> str:
                 property_ = any(getattr(d, "id", "") == "property" for d in member.decorator_list)
                 arguments = [a.arg for a in (*member.args.args, *member.args.kwonlyargs)][1:]
                 shown = member.name if property_ else f"{member.name}({', '.join(arguments)})"
-                meaning = _cell(ast.get_docstring(member) or "")
+                meaning = _cell(ast.get_docstring(member) or _comment(name.rstrip("2"), member.name))
                 out.append(
                     f"| `{shown}` | {_type(ast.unparse(member.returns) if member.returns else '')} | {meaning} |"
                 )
     return "\n".join(out)
+
+
+def _comment(struct: str, field: str) -> str:
+    """What the headers say of a field."""
+    for path in sorted(HEADERS.glob("*.hpp")):
+        if body := re.search(rf"^(?:struct|class) {struct} \{{(.*?)^\}};", path.read_text(), re.DOTALL | re.MULTILINE):
+            found = re.search(rf"\b{field}\b[^;\n]*;\s*///< (.*)$", body[1], re.MULTILINE)
+            return found[1] if found else ""
+    return ""
 
 
 def _type(text: str) -> str:

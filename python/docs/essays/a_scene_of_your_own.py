@@ -53,8 +53,9 @@ print(explain.text(explain.plan(scene)))
 try:
     scene.override(**{"contact.friction.coeficient": 0.3})
 except warmslip.SceneError as refused:
-    print(refused)
-    assert "did you mean 'coefficient'?" in str(refused)
+    said = str(refused)
+print(said)
+assert "did you mean 'coefficient'?" in said
 
 # %% [markdown]
 # ## The loop
@@ -66,14 +67,13 @@ time, normal, friction, ledgers = (np.array(column, dtype=object) for column in 
 time, normal, friction = (column.astype(float) for column in (time, normal, friction))
 lid = 0.03 * np.sin(2 * np.pi * np.maximum(0, time - 0.5))
 assert job.outcome == "right"
-
 figure, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 ax.plot(lid, -friction)
 ax.set(xlabel="displacement of the lid", ylabel="force of the drive")
 
 # %% [markdown]
 # The flat parts are Coulomb's: there the whole foot slides and friction is 0.3 times the normal force. The
-# slanted ones are the elastic foot while it sticks. The foot is let go point by point, so the corners are round.
+# slanted ones are the elastic foot while it sticks; it lets go point by point, so the corners are round.
 
 # %%
 ratio = np.abs(friction) / normal

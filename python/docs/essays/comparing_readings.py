@@ -2,8 +2,8 @@
 # # Comparing readings
 #
 # The paper gives its material data in one line: "M = R = K = 1 for all entries". Taken by the letter the conductivity
-# K is a matrix of ones, whose inverse does not exist: heat flows along the diagonal alone. So the library holds four readings. They
-# differ in K (ones or identity), in the expansion M and in the heating R.
+# K is a matrix of ones, whose inverse does not exist: heat flows along the diagonal alone. So the library holds four
+# readings. They differ in K (ones or identity), in the expansion M and in the heating R.
 
 # %%
 import matplotlib.pyplot as plt
@@ -76,7 +76,8 @@ assert orders["printed"] < 0.95 < min(orders[name] for name in READINGS[1:])
 # %% [markdown]
 # The reading as printed has by far the largest error and the lowest order: a singular K lets the temperature jump across the
 # diagonal. The orders of the others look better than they are, as the reference has an error of its own. A true first
-# order measured against a solution only twice as fine as the finest would show log2(3) = 1.58 at the last halving; `warmslip rates` takes that off.
+# order, measured against a solution only twice as fine as the finest run, would show log2(3) = 1.58 at the last halving;
+# `warmslip rates` takes that off.
 
 # %%
 true = [size - 1 / 64 for size in (1 / 16, 1 / 32)]

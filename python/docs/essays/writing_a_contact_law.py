@@ -43,8 +43,9 @@ scene = warmslip.load("quasistatic_punch")  # a body pressed down by its lid, th
 try:
     warmslip.run(scene, laws={"bottom": Law(compliance=lambda r: (1e4 * r, 1e4, 1e4 * r**2))})
 except ValueError as refused:
-    print(refused)
-    assert "the third value is the integral of the first" in str(refused)
+    said = str(refused)
+print(said)
+assert "the third value is the integral of the first" in said
 
 # %% [markdown]
 # ## First the law that is already there
