@@ -17,5 +17,6 @@ PYTHON
   )
   python -m pip --disable-pip-version-check -qq install "${extra[@]}"
 fi
-sphinx-build -W --keep-going -q "$@" -b html python/docs build/docs
+# -E: pages made from the code are read anew
+sphinx-build -W --keep-going -q -E "$@" -b html python/docs build/docs
 echo "open build/docs/index.html"

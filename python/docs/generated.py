@@ -31,7 +31,7 @@ def _cell(text: str) -> str:
 
 def _number(schema: dict[str, Any], name: str) -> str:
     bounds = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
-    return " ".join([name, *(f"{sign} {schema[key]:g}" for key, sign in bounds.items() if key in schema)])
+    return f"{name} {' and '.join(f'{sign} {schema[key]:g}' for key, sign in bounds.items() if key in schema)}".strip()
 
 
 def _kind(schema: dict[str, Any]) -> str:
