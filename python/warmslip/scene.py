@@ -63,6 +63,7 @@ class Scene(t.Table):
 
     @property
     def contacts(self) -> list[t.ContactTable]:
+        """The contact tables, also of one; none gives an empty list."""
         if self.contact is None:
             return []
         return self.contact if isinstance(self.contact, list) else [self.contact]
