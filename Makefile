@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan bench mutants lint
+.PHONY: help setup reproduce test verify coverage asan bench mutants lint docs
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -31,6 +31,9 @@ bench: setup  ## the benchmarks alone (ARGS go to pytest)
 
 mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --handful N, --every, --out FILE)
 	@$(env) python tests/mutants/run.py $(ARGS)
+
+docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
+	@bash workflows/docs.sh $(ARGS)
 
 lint: setup  ## format, style, types and layers
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports

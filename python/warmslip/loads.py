@@ -73,6 +73,7 @@ class Loads:
 
     @classmethod
     def of(cls, scene: Scene) -> Loads:
+        """The loads that a scene states."""
         contacts = scene.contacts
 
         def each(values: list[Data]) -> Data | list[Data]:

@@ -41,10 +41,12 @@ class Result:
 
     @property
     def outcome(self) -> str:
+        """`right`, or the name of what stopped the run."""
         return str(self.summary["outcome"])
 
     @property
     def right(self) -> bool:
+        """Whether the run went to its end and every step closed its books."""
         return self.outcome == "right"
 
 

@@ -34,6 +34,7 @@ class Scene(t.Table):
     """A whole scene. Tables are blocks of the problem, and what is absent costs nothing; keys are those of the TOML file."""
 
     title: str = ""
+    """One line that says what the scene is."""
     mesh: t.MeshTable
     time: t.TimeTable
     inertia: t.InertiaTable | None = None
@@ -64,6 +65,7 @@ class Scene(t.Table):
 
     @property
     def contacts(self) -> list[t.ContactTable]:
+        """The contact tables, also of one; none gives an empty list."""
         if self.contact is None:
             return []
         return self.contact if isinstance(self.contact, list) else [self.contact]

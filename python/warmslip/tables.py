@@ -1,4 +1,7 @@
-"""The tables of a scene: typed, frozen, unknown keys forbidden, each refusing what no other table is needed to refuse."""
+"""The tables of a scene: typed, frozen, unknown keys forbidden, each refusing what no other table is needed to refuse.
+
+What stands below a field is its meaning in the schema, in editors and in the reference of scene files.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,7 @@ PARTS = {"square": ("left", "right", "bottom", "top"), "cube": ("left", "right",
 
 
 class Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class MeshTable(Table):
@@ -47,13 +50,20 @@ class MeshTable(Table):
     `grading` is the size of the last brick over that of the first, one number an axis.
     """
 
-    shape: Literal["square", "cube"] | None = None  # square unless there is a file
+    shape: Literal["square", "cube"] | None = None
+    """Body of a structured mesh; square unless there is a file. Parts: left, right, bottom, top, and front, back of a cube."""
     n: Count | list[Count] = 32
-    lengths: list[Positive] | None = None  # default: 1 along every axis
-    grading: list[Positive] | None = None  # default: 1 along every axis
+    """Bricks a side, or one number an axis."""
+    lengths: list[Positive] | None = None
+    """Sides, length; 1 along every axis unless given."""
+    grading: list[Positive] | None = None
+    """Size of the last brick over that of the first, one number an axis; 1 unless given."""
     diagonal: Literal["right", "left", "crisscross"] = "right"
-    file: str | None = None  # .msh with physical names, beside the scene file
-    refine: Annotated[int, Field(ge=0, le=6, strict=True)] = 0  # times that the cells of a file are halved
+    """How a brick is cut: from (0,0) to (1,1), the other way, or both (square only)."""
+    file: str | None = None
+    """A gmsh file with physical names, beside the scene file; takes the place of all other keys here but refine."""
+    refine: Annotated[int, Field(ge=0, le=6, strict=True)] = 0
+    """How many times the cells of a file are halved."""
 
     @property
     def dim(self) -> int:
@@ -122,12 +132,18 @@ class TimeTable(Table):
     """`steps` uniform steps of backward Euler to time `end`."""
 
     end: Positive = 1.0
+    """Last time T."""
     steps: Count = 32
+    """Number of steps; the step size is k = end/steps."""
     coupling: Literal["staggered", "lagged", "monolithic"] = "staggered"
+    """What motion and heat know of each other in a step: old temperature and new velocity, both old, or both new."""
 
 
 class InertiaTable(Table):
-    density: NonNegative = 1.0  # rho; 0 leaves the motion quasistatic
+    """Mass; without it every step is in equilibrium."""
+
+    density: NonNegative = 1.0
+    """rho, mass per volume; 0 leaves the motion quasistatic."""
 
 
 class IsotropicTable(Table):
@@ -135,10 +151,15 @@ class IsotropicTable(Table):
     or any symmetric `tensor` that takes engineering strains (xx, yy, xy) or (xx, yy, zz, yz, xz, xy) to stresses."""
 
     lame: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    """[lambda, mu]: stress of an elasticity, stress times time of a viscosity."""
     young: NonNegative | None = None
+    """Young's modulus; with poisson and assumption."""
     poisson: Finite | None = None
+    """Poisson's ratio, between -1 and 0.5 (1 in plane stress)."""
     assumption: Literal["plane_stress", "plane_strain", "solid"] | None = None
+    """What holds along the third axis; solid in space."""
     tensor: list[list[Finite]] | None = None
+    """Symmetric 3 x 3 (plane) or 6 x 6 (space) matrix from engineering strains to stresses."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -176,17 +197,28 @@ class IsotropicTable(Table):
 
 
 class ExpansionTable(Table):
-    tensor: Tensor  # M of (2.1), stress per temperature
+    """What a temperature adds to the stress: -M theta."""
+
+    tensor: Tensor
+    """M of (2.1), stress per temperature; a number stands for that times the identity."""
 
 
 class HeatingTable(Table):
-    tensor: Tensor  # R of (2.4), heat per strain
+    """What a motion adds to the heat: R : e(w)."""
+
+    tensor: Tensor
+    """R of (2.4), heat per volume and strain; R = -M is what thermodynamics asks for."""
 
 
 class HeatTable(Table):
-    conductivity: Tensor  # K of (2.2)
-    capacity: Positive = 1.0  # per volume and temperature
-    source: Value = 0.0  # q0
+    """A temperature, conducted and stored."""
+
+    conductivity: Tensor
+    """K of (2.2), a symmetric matrix or a number."""
+    capacity: Positive = 1.0
+    """Heat per volume and temperature."""
+    source: Value = 0.0
+    """q0, heat per volume and time: a number or a formula."""
     expansion: ExpansionTable | None = None
     heating: HeatingTable | None = None
 
@@ -195,7 +227,9 @@ class RegionHeatTable(Table):
     """As [heat], without the source, which is one formula for the whole body."""
 
     conductivity: Tensor
+    """K of (2.2), a symmetric matrix or a number."""
     capacity: Positive = 1.0
+    """Heat per volume and temperature."""
     expansion: ExpansionTable | None = None
     heating: HeatingTable | None = None
 
@@ -207,6 +241,7 @@ class RegionTable(Table):
     """
 
     where: str | None = None
+    """A condition in x, y, z that holds at the centres of its cells; without it the name is one of the mesh file."""
     inertia: InertiaTable | None = None
     elasticity: IsotropicTable | None = None
     viscosity: IsotropicTable | None = None
@@ -214,9 +249,14 @@ class RegionTable(Table):
 
 
 class LoadsTable(Table):
-    body: Values | None = None  # f0
-    traction: dict[str, Values] = {}  # fN by boundary part
-    heat_flux: dict[str, Value] = {}  # into the body, by boundary part
+    """Forces and heat from outside; numbers, or formulas of x, y, z and t."""
+
+    body: Values | None = None
+    """f0, force per volume: a number or a formula an axis."""
+    traction: dict[str, Values] = {}
+    """fN, force per area, by boundary part: a number or a formula an axis."""
+    heat_flux: dict[str, Value] = {}
+    """Heat per area and time into the body, by boundary part: a number or a formula."""
 
 
 class SupportsTable(Table):
@@ -224,10 +264,12 @@ class SupportsTable(Table):
 
     displacement: Annotated[
         Annotated[list[str], Tag("several")] | Annotated[dict[str, Values], Tag("one")], Discriminator(_listed)
-    ] = []  # Gamma_D
+    ] = []
+    """Gamma_D: ["top"] is clamped; { top = ["0.1 * t", 0.0] } follows that displacement."""
     temperature: Annotated[
         Annotated[list[str], Tag("several")] | Annotated[dict[str, Value], Tag("one")], Discriminator(_listed)
     ] = []
+    """["top"] is held at zero; { top = "20 * t" } at that temperature."""
 
     @property
     def moved(self) -> dict[str, list[float | str]]:
@@ -248,12 +290,18 @@ class FrictionTable(Table):
     the law is smeared over that slip speed, and sticking points creep.
     """
 
-    coefficient: NonNegative = 0.0  # mu_tau
-    cohesion: NonNegative = 0.0  # stress
-    limit: Positive | None = None  # stress
+    coefficient: NonNegative = 0.0
+    """mu_tau, bound per pressure, dimensionless."""
+    cohesion: NonNegative = 0.0
+    """Bound without pressure, stress."""
+    limit: Positive | None = None
+    """The bound never exceeds it, stress."""
     kinetic: NonNegative | None = None
-    speed: Positive | None = None  # velocity
-    regularisation: Positive | None = None  # velocity
+    """Coefficient at slip speeds far above speed."""
+    speed: Positive | None = None
+    """Slip speed over which the coefficient falls to kinetic, velocity."""
+    regularisation: Positive | None = None
+    """Slip speed over which the law is smeared, velocity; sticking points creep."""
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
@@ -271,15 +319,21 @@ class FrictionTable(Table):
 
 
 class ExchangeTable(Table):
-    conductance: NonNegative = 0.0  # k_c
-    per_pressure: NonNegative = 0.0  # conductance per contact pressure, added to k_c
-    foundation_temperature: Value = 0.0  # theta_F
+    """Heat from the body to the foundation: (conductance + per_pressure p_nu) (theta - theta_F)."""
+
+    conductance: NonNegative = 0.0
+    """k_c, heat per area, time and temperature difference."""
+    per_pressure: NonNegative = 0.0
+    """Conductance per contact pressure, added to k_c."""
+    foundation_temperature: Value = 0.0
+    """theta_F: a number or a formula."""
 
 
 class FrictionHeatTable(Table):
-    share: Annotated[
-        float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)
-    ]  # of the frictional heat, into the body
+    """Heat that friction makes: the friction force times the slip speed."""
+
+    share: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
+    """Of the heat that friction makes, what goes into the body."""
 
 
 class ContactTable(Table):
@@ -289,11 +343,17 @@ class ContactTable(Table):
     """
 
     part: str
-    stiffness: NonNegative | None = None  # c_nu
+    """Boundary part that touches or exchanges heat."""
+    stiffness: NonNegative | None = None
+    """c_nu, pressure per penetration to the power of the exponent."""
     exponent: Annotated[float, Field(strict=True, ge=1, allow_inf_nan=False)] = 1.0
-    pressure_limit: Positive | None = None  # stress
-    gap: Value = 0.0  # g
+    """1 is linear compliance; larger exponents begin softly."""
+    pressure_limit: Positive | None = None
+    """The pressure never exceeds it, stress."""
+    gap: Value = 0.0
+    """g, distance to the foundation along the outward normal at rest, length: a number or a formula."""
     quadrature: Annotated[str, Field(pattern=r"^(nodal|gauss-[1-8])$")] = "nodal"
+    """Where the law holds: at the vertices (nodal), or at that many of Gauss's points a direction (gauss-1 to gauss-8)."""
     friction: FrictionTable | None = None
     heat_exchange: ExchangeTable | None = None
     friction_heating: FrictionHeatTable | None = None
@@ -314,14 +374,22 @@ class InitialTable(Table):
     """Initial data, set to what the supports are held at there."""
 
     displacement: Values | None = None
+    """Length, a number or a formula of the place an axis; 0 unless given."""
     velocity: Values | None = None
+    """A number or a formula of the place an axis; 0 unless given."""
     temperature: Value = 0.0
+    """A number or a formula of the place."""
 
 
 class OutputTable(Table):
-    every: Count = 1  # states stored every so many steps; the last one always
-    checkpoint: Count = 100  # steps between two checkpoints
-    checkpoint_minutes: Positive | None = None  # between two checkpoints, whichever comes first
+    """What is stored and how often."""
+
+    every: Count = 1
+    """States are stored every so many steps; the last one always."""
+    checkpoint: Count = 100
+    """Steps between two checkpoints."""
+    checkpoint_minutes: Positive | None = None
+    """Minutes between two checkpoints; whichever comes first."""
 
 
 # The same for a scene in which every block is there and every datum is a constant. Narrower types of frozen lists are safe,

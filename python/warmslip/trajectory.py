@@ -201,10 +201,12 @@ class Trajectory:
 
     @property
     def nodes(self) -> Array:
+        """Positions, (nodes, d)."""
         return np.asarray(self._file["mesh/nodes"])
 
     @property
     def cells(self) -> Any:
+        """Nodes of every cell, (cells, d+1)."""
         return np.asarray(self._file["mesh/cells"])
 
     @property
@@ -263,6 +265,7 @@ class Trajectory:
         )
 
     def close(self) -> None:
+        """Closes the file; a `with` block does."""
         self._file.close()
 
     def __enter__(self) -> Self:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,16 @@ def problem_of(case: str) -> str:
     return "_".join(case.split("_")[:2])
 
 
+def method_of(path: Path) -> tuple[str, str]:
+    """Coupling and quadrature: of the name `reading_theta_coupling`, with a quadrature or without, else of the stamp."""
+    parts = path.stem.split("_")
+    if len(parts) > 2:
+        return parts[2], parts[3] if len(parts) > 3 else "nodal"
+    scene = json.loads(path.with_suffix(".json").read_text())["scene"]
+    contact = scene.get("contact")
+    return scene["time"]["coupling"], contact["quadrature"] if isinstance(contact, dict) else "nodal"
+
+
 def table(paths: list[Path]) -> list[dict[str, Any]]:
     """Error (largest |u|_V + |w|_L2 + |theta|_L2), CPU seconds and counts of every run, with the front of each problem.
 
@@ -21,7 +32,7 @@ def table(paths: list[Path]) -> list[dict[str, Any]]:
     """
     out: list[dict[str, Any]] = []
     for path in paths:
-        parts = path.stem.split("_")
+        coupling, quadrature = method_of(path)
         *members, reference = rates.read(path)
         for line in members:
             if line["n"] == reference["n"] or line["steps"] == reference["steps"]:
@@ -40,8 +51,8 @@ def table(paths: list[Path]) -> list[dict[str, Any]]:
                 {
                     "case": path.stem,
                     "problem": problem_of(path.stem),
-                    "coupling": parts[2],
-                    "quadrature": parts[3] if len(parts) > 3 else "nodal",
+                    "coupling": coupling,
+                    "quadrature": quadrature,
                 }
                 | {"error": line["e_u_w_theta"]}
                 | {key: line[key] for key in keep}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import warmslip
 from warmslip import Run, extremes, readings, study, work
 from warmslip.errors import Comparison, Largest
 from warmslip.problem import discretise, stress_measures
+from warmslip.scene import load
 
 KEYS = {"contact.heat_exchange.foundation_temperature": 10.0}
 
@@ -129,6 +131,16 @@ def test_the_front_holds_the_cheap_and_the_accurate(tmp_path: Path) -> None:
     rows = [{"n": n, "steps": n, "e_u_w_theta": e, "cpu_seconds": s} | counts for n, e, s in runs]
     found = work.table([write(tmp_path / "mixed_0_staggered.csv", rows)])
     assert [(r["n"], r["front"]) for r in found] == [(16, True), (32, True), (64, False)]
+
+
+def test_a_study_of_any_name_has_its_method_from_its_stamp(tmp_path: Path) -> None:
+    for keys, method in (({}, ("staggered", "nodal")), ({"quadrature": "gauss-2"}, ("lagged", "gauss-2"))):
+        told = load("paper_mixed").override(
+            **{"time.coupling": method[0]} | {f"contact.{key}": value for key, value in keys.items()}
+        )
+        (tmp_path / "mine.json").write_text(json.dumps({"scene": told.resolved()}))
+        assert work.method_of(tmp_path / "mine.csv") == method
+    assert work.method_of(tmp_path / "mixed_0_lagged_gauss-2.csv") == ("lagged", "gauss-2")
 
 
 def test_disagreement_is_relative_and_sees_every_field() -> None:
