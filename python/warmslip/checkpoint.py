@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,12 +68,26 @@ def save(folder: Path, job: Run) -> None:
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Record and arrays of a whole checkpoint, None for a torn one."""
     try:
+        _honest(path)
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: np.array(file[name]) for name in file.files}
         record = json.loads(str(arrays.pop("record")))
         return (record, arrays) if isinstance(record.get("owner"), dict) else None
     except Exception:  # zip, zlib, NumPy's header and JSON each have their own words for torn bytes
         return None
+
+
+def _honest(path: Path) -> None:
+    """Raises ValueError when an array says that it is larger than the file: NumPy would make room for it first."""
+    form: Any = np.lib.format
+    with zipfile.ZipFile(path) as whole:
+        for name in whole.namelist():
+            with whole.open(name) as member:
+                if form.read_magic(member) != (1, 0):
+                    raise ValueError(f"{name} is not as NumPy writes it")
+                shape, _, kind = form.read_array_header_1_0(member)
+                if math.prod(shape) * kind.itemsize > path.stat().st_size:
+                    raise ValueError(f"{name} ends before all that it announces")
 
 
 def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -26,6 +27,7 @@ OneOrMore = Annotated[
     Annotated[t.ContactTable, Tag("one")] | Annotated[list[t.ContactTable], Tag("several")],
     Discriminator(lambda value: "several" if isinstance(value, list) else "one"),
 ]
+LARGEST, DEEPEST = 10**6, 50  # of a scene file: characters, dots in a key
 
 
 class Scene(t.Table):
@@ -184,12 +186,19 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
         text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text()
     else:
         try:
-            text = path.read_text()
+            with path.open() as file:
+                text = file.read(LARGEST + 1)
         except (OSError, ValueError) as error:  # ValueError: bytes that are no text, or a null byte in the name
             reason = error.strerror if isinstance(error, OSError) else "not a text file"
             near = difflib.get_close_matches(str(scene), library(), 1)
             hint = f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}"
             raise SceneError(f"cannot read scene '{scene}' ({reason}); {hint}") from None
+    if len(text) > LARGEST:
+        raise SceneError(f"scene '{scene}' is longer than {LARGEST} characters; keep meshes and tables outside")
+    if any(
+        piece.count(".") > DEEPEST for piece in re.split(r"[=\[\]{},\n]", text)
+    ):  # tomllib takes the square of their number
+        raise SceneError(f"scene '{scene}' has a key with more than {DEEPEST} dots; correct it")
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -89,6 +89,27 @@ def mesh(data: bytes) -> bool:
     return True
 
 
+def lists(data: bytes) -> bool:
+    """A mesh from lists: four bytes say its dimension, nodes, cells and facets, one each is a coordinate or a node's number.
+
+    It is also tried as nested in a square or cube, and in itself.
+    """
+    head, rest = (*data[:4], 0, 0, 0, 0), np.frombuffer(data[4:].ljust(256, b"\0"), np.int8)
+    d, n, c, f = 2 + head[0] % 2, head[1] % 20, head[2] % 16, head[3] % 8
+    x, cells, facets = np.split(rest[: n * d + c * (d + 1) + f * d], [n * d, n * d + c * (d + 1)])
+    nodes = np.where(x == 127, np.inf, np.where(x == -128, 1e-300, x / 4.0)).reshape(n, d)
+    kind = _core.Mesh2 if d == 2 else _core.Mesh3
+    try:
+        built = kind.from_lists(nodes, cells.reshape(c, d + 1), {"part": facets.reshape(f, d)} if f else {})
+    except ValueError as error:
+        return _refused(error)
+    assert built.nodes.shape == (n, d)
+    for coarse in (built, kind.box([1] * d, [1.0] * d, _core.Diagonal.right)):
+        with contextlib.suppress(ValueError):
+            _core.prolongation(coarse, built)
+    return True
+
+
 def _arrays(data: bytes) -> dict[str, Any]:
     """A JSON object of names and values; bytes do not get past the checksums of a zip file, nor far into HDF5."""
     try:
@@ -153,6 +174,7 @@ READERS: dict[str, Callable[[bytes], bool]] = {
     "scene": scene,
     "formula": formula,
     "mesh": mesh,
+    "lists": lists,
     "checkpoint": checkpoints,
     "trajectory": trajectory,
 }

@@ -10,7 +10,7 @@ if [[ ${1:-} == --merge ]]; then merge=1; shift; fi
 seconds=${1:-600}
 shift || true
 readers=("$@")
-((${#readers[@]})) || readers=(scene formula mesh checkpoint trajectory)
+((${#readers[@]})) || readers=(scene formula mesh lists checkpoint trajectory)
 command -v clang++ >/dev/null || { echo "the fuzzer needs clang++: apt-get install clang" >&2; exit 1; }
 
 build=build/fuzz
