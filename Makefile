@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan bench mutants lint docs
+.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -25,6 +25,9 @@ coverage: setup  ## lines and branches of the C++ core that the fast tests reach
 
 asan: setup  ## the C++ tests under the address and undefined behaviour sanitizers
 	@$(env) cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
+
+fuzz: setup  ## random bytes through every reader of files, under the sanitizers for ten minutes (ARGS: seconds, readers)
+	@$(env) bash tests/fuzz/run.sh $(ARGS)
 
 bench: setup  ## the benchmarks alone (ARGS go to pytest)
 	@$(env) python -m pytest -o addopts="--import-mode=importlib" --benchmark-only $(ARGS) tests/benchmarks

@@ -7,9 +7,9 @@ killed leaves at least one whole. What a checkpoint belongs to (scene, mesh, cod
 from __future__ import annotations
 
 import json
+import math
 import os
 import zipfile
-import zlib
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
+STATUSES = (0, 1, 2)  # open, stick, slip
 
 
 _fingerprint = cache(provenance.fingerprint)  # it reads every source, and this process has one code
@@ -67,12 +68,55 @@ def save(folder: Path, job: Run) -> None:
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Record and arrays of a whole checkpoint, None for a torn one."""
     try:
+        _honest(path)
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: np.array(file[name]) for name in file.files}
         record = json.loads(str(arrays.pop("record")))
-        return record, arrays
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return (record, arrays) if isinstance(record.get("owner"), dict) else None
+    except Exception:  # zip, zlib, NumPy's header and JSON each have their own words for torn bytes
         return None
+
+
+def _honest(path: Path) -> None:
+    """Raises ValueError when an array says that it is larger than the file: NumPy would make room for it first."""
+    form: Any = np.lib.format
+    with zipfile.ZipFile(path) as whole:
+        for name in whole.namelist():
+            with whole.open(name) as member:
+                if form.read_magic(member) != (1, 0):
+                    raise ValueError(f"{name} is not as NumPy writes it")
+                shape, _, kind = form.read_array_header_1_0(member)
+                if math.prod(shape) * kind.itemsize > path.stat().st_size:
+                    raise ValueError(f"{name} ends before all that it announces")
+
+
+def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
+    """Whether all is there that a run goes on from, in its shapes and finite: what a run of this scene would have written."""
+    nodes, d = job.discretisation.mesh.nodes.shape
+    points, problem = len(job.stepper.status), job.discretisation.problem
+    shapes: dict[str, tuple[int, ...]] = {"contact_force": (points * d,), "status": (points,)}
+    shapes |= {"u": (nodes, d), "w": (nodes, d)} if problem.moves else {}
+    shapes |= {"theta": (nodes,)} if problem.conducts else {}
+    if any(name not in arrays or arrays[name].shape != shape for name, shape in shapes.items()):
+        return False
+    status = arrays["status"]
+    if not (status.dtype.kind == "i" and np.isin(status, STATUSES).all()):
+        return False
+    if not all(arrays[name].dtype == float and np.isfinite(arrays[name]).all() for name in shapes.keys() - {"status"}):
+        return False
+    try:
+        tables = [(record["worst"], job.worst), (record["floors"], job.floors)]
+        counts = [record["step"], record["newton_max"], *record["stages"].values()]
+        return (
+            math.isfinite(float.fromhex(record["time"]))
+            and all(
+                table.keys() == own.keys() and {type(v) for v in table.values()} == {float} for table, own in tables
+            )
+            and all(type(count) is int and count >= 0 for count in counts)
+            and 0 < record["step"] <= job.scene.time.steps
+        )
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        return False
 
 
 def load(folder: Path, job: Run) -> int:
@@ -89,6 +133,8 @@ def load(folder: Path, job: Run) -> int:
                 continue
             other = [key for key, value in _owner(job).items() if whole[0]["owner"].get(key) != value]
             if not other:
+                if not _fits(*whole, job):
+                    continue
                 found = whole
                 break
             foreign = f"{folder / name} is of another {' and '.join(other)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-import math
+import sys
 import warnings
 from typing import Annotated, Any
 
@@ -147,20 +147,26 @@ class Expression:
 
 
 def finite(value: float) -> bool:
-    """Whether a number is finite as a float: integers may be too long for one."""
+    """Whether a number is one in double precision; an integer may be too large for that."""
+    return abs(value) <= sys.float_info.max
+
+
+def told(value: Any) -> str:
+    """A value as a message repeats it, of a long one the beginning."""
     try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits, a table in a table in a ...
+        return "what was given"
+    return text if len(text) <= 200 else f"{text[:200]}..."
 
 
 def _checked(value: Any) -> Any:
     if isinstance(value, str):
         Expression(value)
     elif isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is neither a number nor a formula in quotes; give one")
+        raise ValueError(f"{told(value)} is neither a number nor a formula in quotes; give one")
     elif not finite(value):
-        raise ValueError(f"{str(value)[:20]} is not a finite number; give one")
+        raise ValueError(f"{told(value)} is not a finite number; give one")
     return value
 
 

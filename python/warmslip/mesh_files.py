@@ -1,8 +1,9 @@
-"""Meshes from gmsh, through meshio: nodes, cells, and parts and regions by their physical names. No compiled code is needed."""
+"""Meshes from gmsh: nodes, cells, and parts and regions by their physical names. No compiled code is needed."""
 
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -12,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-CELLS = {2: "triangle", 3: "tetra"}
-FACETS = {2: "line", 3: "triangle"}
+from warmslip import gmsh
+
 LARGEST = 2**31  # bytes of a file that is read
 
 
@@ -32,7 +33,8 @@ class MeshFile:
 def find(name: str) -> Path:
     """The file `name`, or the one of that name that comes with the package."""
     packaged = Path(str(resources.files("warmslip") / "scenes" / name))
-    return packaged if not Path(name).exists() and packaged.exists() else Path(name)
+    # os.path: Path.exists raises for names that no file can have
+    return packaged if not os.path.exists(name) and os.path.exists(packaged) else Path(name)
 
 
 def read(name: str) -> MeshFile:
@@ -43,54 +45,47 @@ def read(name: str) -> MeshFile:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no such file"
         raise ValueError(f"mesh file '{name}' cannot be read ({reason}); check the path") from None
-    if not path.is_file() or status.st_size > LARGEST:
-        raise ValueError(f"mesh file '{name}' is no file of at most 2 GB; check the path")
+    if not path.is_file() or not 0 < status.st_size <= LARGEST:
+        raise ValueError(f"mesh file '{name}' is empty or no file of at most 2 GB; check the path")
     return _read(path, name, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
 def _read(path: Path, name: str, _: int) -> MeshFile:
-    import meshio
-
+    data = path.read_bytes()
     try:
-        raw = meshio.gmsh.read(path)
-        return _convert(raw, hashlib.sha256(path.read_bytes()).hexdigest()[:16])
+        raw = gmsh.parse(data)
+    except ValueError as error:
+        raise ValueError(f"'{name}' is not a gmsh mesh that can be read ({error}); save it as MSH 4.1 or 2.2") from None
+    try:
+        return _convert(raw, hashlib.sha256(data).hexdigest()[:16])
     except ValueError as error:
         raise ValueError(f"mesh file '{name}': {error}") from None
-    except (Exception, SystemExit) as error:  # meshio raises what comes
-        told = (str(error).splitlines() or [type(error).__name__])[0]
-        raise ValueError(f"'{name}' is not a gmsh mesh that can be read ({told}); save it as MSH 4.1 or 2.2") from None
 
 
-def _convert(raw: Any, digest: str) -> MeshFile:
-    blocks = [(block.type, np.asarray(block.data), i) for i, block in enumerate(raw.cells)]
-    kinds = {kind for kind, _, _ in blocks}
-    if higher := sorted(kinds - {"vertex", "line", "triangle", "tetra"}):
-        raise ValueError(f"it holds {', '.join(higher)}; only triangles and tetrahedra of first order can be read")
-    if not kinds & {"triangle", "tetra"}:
+def _convert(raw: gmsh.Raw, digest: str) -> MeshFile:
+    dim = max((size for size, _, _ in raw.blocks), default=0) - 1
+    if dim < 2:
         raise ValueError("it holds no triangles and no tetrahedra; mesh the body")
-    dim = 3 if "tetra" in kinds else 2
-    points = np.asarray(raw.points, dtype=float)
-    if dim == 2 and points.shape[1] > 2 and np.ptp(points[:, 2]) > 0:
+    points = raw.nodes
+    if not np.isfinite(points).all():
+        raise ValueError("a node has a coordinate that is not finite; repair the mesh")
+    if dim == 2 and np.ptp(points[:, 2]) > 0:
         raise ValueError("its triangles do not lie in a plane z = constant; mesh a plane body or a solid one")
-    tags = raw.cell_data.get("gmsh:physical", [np.zeros(len(data), int) for _, data, _ in blocks])
-    names = {(int(tag), int(d)): key for key, (tag, d) in raw.field_data.items()}
 
-    def gather(kind: str) -> tuple[Any, Any]:
-        chosen = [(data, np.asarray(tags[i])) for k, data, i in blocks if k == kind]
-        empty = np.empty((0, {"line": 2, "triangle": 3, "tetra": 4}[kind]), int)
-        return (
-            np.concatenate([data for data, _ in chosen] or [empty]),
-            np.concatenate([tag for _, tag in chosen] or [np.empty(0, int)]),
-        )
+    def gather(size: int) -> Any:
+        return np.concatenate([np.empty((0, size), np.int64), *(nodes for n, nodes, _ in raw.blocks if n == size)])
 
-    cells, cell_tags = gather(CELLS[dim])
-    facets, facet_tags = gather(FACETS[dim])
-    parts = {n: facets[facet_tags == tag].astype(np.int32) for (tag, d), n in names.items() if d == dim - 1}
-    regions = {n: np.flatnonzero(cell_tags == tag) for (tag, d), n in names.items() if d == dim}
+    def members(size: int, tag: int) -> Any:
+        marks = [np.full(len(nodes), tag in groups) for n, nodes, groups in raw.blocks if n == size]
+        return np.flatnonzero(np.concatenate([np.empty(0, bool), *marks]))
+
+    cells, facets = gather(dim + 1), gather(dim)
+    parts = {name: facets[members(dim, tag)].astype(np.int32) for (d, tag), name in raw.names.items() if d == dim - 1}
+    regions = {name: members(dim + 1, tag) for (d, tag), name in raw.names.items() if d == dim}
     for kind, found in (("part", parts), ("region", regions)):
-        for key, members in found.items():
-            if len(members) == 0:
+        for key, there in found.items():
+            if len(there) == 0:
                 raise ValueError(f"the {kind} '{key}' is empty; remove the physical group or give it entities")
     nodes = np.ascontiguousarray(points[:, :dim])
     cells = _oriented(nodes, cells)

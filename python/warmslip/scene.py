@@ -6,7 +6,6 @@ import difflib
 import hashlib
 import json
 import re
-import reprlib
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -17,6 +16,7 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 from warmslip import mesh_files
 from warmslip import tables as t
 from warmslip.consistency import problems
+from warmslip.expressions import told
 
 
 class SceneError(ValueError):
@@ -27,7 +27,7 @@ OneOrMore = Annotated[
     Annotated[t.ContactTable, Tag("one")] | Annotated[list[t.ContactTable], Tag("several")],
     Discriminator(lambda value: "several" if isinstance(value, list) else "one"),
 ]
-KINDS = ("int", "list[", "dict[", "constrained", "one", "several", "float", "function-")  # what pydantic adds to places
+LARGEST, DEEPEST = 10**6, 50  # of a scene file: characters, dots in a key
 
 
 class Scene(t.Table):
@@ -188,12 +188,19 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
         text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text()
     else:
         try:
-            text = path.read_text()
-        except (OSError, UnicodeDecodeError) as error:
+            with path.open() as file:
+                text = file.read(LARGEST + 1)
+        except (OSError, ValueError) as error:  # ValueError: bytes that are no text, or a null byte in the name
             reason = error.strerror if isinstance(error, OSError) else "not a text file"
             near = difflib.get_close_matches(str(scene), library(), 1)
             hint = f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}"
             raise SceneError(f"cannot read scene '{scene}' ({reason}); {hint}") from None
+    if len(text) > LARGEST:
+        raise SceneError(f"scene '{scene}' is longer than {LARGEST} characters; keep meshes and tables outside")
+    if any(
+        piece.count(".") > DEEPEST for piece in re.split(r"[=\[\]{},\n]", text)
+    ):  # tomllib takes the square of their number
+        raise SceneError(f"scene '{scene}' has a key with more than {DEEPEST} dots; correct it")
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -202,6 +209,8 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
                 "contact: [contact] is one part, [[contact]] one of several; write [[contact]] for each"
             ) from None
         raise SceneError(f"scene '{scene}' is not valid TOML: {error}; correct that line") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"scene '{scene}' cannot be read ({_limit(error)}); write it more plainly") from None
     for item in overrides or []:
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
@@ -216,8 +225,13 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
 def _parse(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
+
+
+def _limit(error: Exception) -> str:
+    """What tomllib cannot read although it is TOML."""
+    return "tables or lists are nested too deeply" if isinstance(error, RecursionError) else "an integer is too long"
 
 
 def _set(data: dict[str, Any], key: str, value: Any) -> None:
@@ -258,21 +272,27 @@ def _build(data: dict[str, Any], kind: type[S]) -> S:
         # a union of types gives one error a member: the first tells what is wrong
         first: dict[str, str] = {}
         for e in error.errors():
-            first.setdefault(_key(e), _sentence(e))
+            where = _where(e, data)
+            first.setdefault(_key(where), _sentence(e, where))
         raise SceneError("\n".join(first.values())) from None
 
 
-def _where(error: Any) -> list[str]:
-    return [str(part) for part in error["loc"] if not str(part).startswith(KINDS)]
+def _where(error: Any, data: Any) -> list[str]:
+    """The keys that lead to a problem; pydantic puts names of types and tags between them, which no table here has."""
+    found, place = [], data
+    for part in error["loc"]:
+        if part in place if isinstance(place, dict) else isinstance(place, list | tuple) and isinstance(part, int):
+            found.append(str(part))
+            place = place[part]
+    return [*found, str(error["loc"][-1])] if error["type"] == "missing" else found
 
 
-def _key(error: Any) -> str:
-    return ".".join(_where(error)) or "scene"
+def _key(where: list[str]) -> str:
+    return ".".join(where) or "scene"
 
 
-def _sentence(error: Any) -> str:
-    where, key = _where(error), _key(error)
-    given = error.get("input")
+def _sentence(error: Any, where: list[str]) -> str:
+    key, given = _key(where), told(error.get("input"))
     match error["type"]:
         case "extra_forbidden":
             allowed = _allowed(where[:-1])
@@ -285,11 +305,11 @@ def _sentence(error: Any) -> str:
             message = str(error["ctx"]["error"])
             return message if key == "scene" else f"{key}: {message}"
         case "model_type":
-            return f"{key} is a table, not {reprlib.repr(given)}; its keys are {', '.join(_allowed(where))}"
+            return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where))}"
         case "finite_number":
             return f"{key}: {given} is not a finite number; give one"
         case _:
-            return f"{key} = {reprlib.repr(given)}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
+            return f"{key} = {given}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
 
 
 def _allowed(where: list[str]) -> list[str]:

@@ -11,12 +11,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from warmslip import mesh_files
-from warmslip.expressions import Value, finite
+from warmslip.expressions import Value, finite, told
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=10**9, strict=True)]
+Count = Annotated[int, Field(ge=1, le=2**31 - 1, strict=True)]  # steps and bricks are counted in 32 bits
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=2, max_length=3)]
 Values = Annotated[list[Value], Field(min_length=2, max_length=3)]
@@ -26,7 +26,7 @@ def _number_or_matrix(value: Any) -> Any:
     if isinstance(value, list):
         return value
     if isinstance(value, bool) or not isinstance(value, int | float) or not finite(value):
-        raise ValueError(f"{str(value)[:20]} is neither a finite number nor a matrix; give one")
+        raise ValueError(f"{told(value)} is neither a finite number nor a matrix; give one")
     return value
 
 

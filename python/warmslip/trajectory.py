@@ -19,6 +19,8 @@ from warmslip.scene import build
 
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 LEDGER = tuple(_core.Ledger.terms)
+CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
+DENSEST = 1000  # bytes from a byte of a file that somebody compressed
 # held back before it is written: bytes, seconds
 LARGEST, LONGEST = 2**25, 1.0
 
@@ -188,6 +190,38 @@ class TrajectoryWriter:
             self._file.close()
 
 
+def _check(file: h5py.File) -> None:
+    """Raises ValueError with what is missing or misshapen. A run that was killed may have more rows of one than of another."""
+    nodes, d = _shape(file, "mesh/nodes", "f", None, None)
+    cells = _shape(file, "mesh/cells", "i", None, d + 1)[0]
+    if d not in (2, 3) or not cells or not 0 <= np.min(file["mesh/cells"]) <= np.max(file["mesh/cells"]) < nodes:
+        raise ValueError("mesh/cells names nodes that are not there")
+    _shape(file, "states/time", "f", None)
+    for name, shape in {"u": (nodes, d), "w": (nodes, d), "theta": (nodes,)}.items():
+        if name in file["states"]:
+            _shape(file, f"states/{name}", "f", None, *shape)
+    points = _shape(file, "contact/weights", "f", None)[0]
+    for name, (kind, *more) in CONTACT.items():
+        if points or name in file["contact"]:
+            _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))
+    _shape(file, "steps/time", "f", None)
+    for group in ("steps", "ledger"):
+        for name in file[group]:
+            _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
+
+
+def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[int, ...]:
+    """The shape of a dataset of a kind of numbers, None standing for any length. Raises ValueError when it has another."""
+    data = file.get(name)
+    if not isinstance(data, h5py.Dataset) or data.dtype.kind != kind:
+        raise ValueError(f"{name} is missing or does not hold numbers of the kind it should")
+    if len(data.shape) != len(shape) or any(n not in (m, None) for m, n in zip(data.shape, shape, strict=True)):
+        raise ValueError(f"{name} has shape {data.shape}")
+    if data.nbytes > DENSEST * file.id.get_filesize():
+        raise ValueError(f"{name} has more numbers than the file can hold")
+    return tuple(data.shape)
+
+
 class Trajectory:
     """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), the `series` of every step, `contact` points.
 
@@ -195,9 +229,17 @@ class Trajectory:
     """
 
     def __init__(self, path: str | Path) -> None:
+        """Raises OSError when the file cannot be opened, ValueError when it is no trajectory or a damaged one."""
         self.path = Path(path)
         self._file = h5py.File(self.path, "r")
-        self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
+        try:
+            self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
+            _check(self._file)
+        except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
+            self._file.close()
+            raise ValueError(
+                f"'{path}' is damaged or no trajectory ({error}); give the trajectory.h5 that `warmslip run` wrote"
+            ) from None
 
     @property
     def nodes(self) -> Array:
