@@ -25,7 +25,7 @@ from warmslip import _core, cli, interruption
 DOCS = Path(__file__).parents[2] / "python" / "docs"
 PAGES = [page for page in sorted(DOCS.rglob("*.md")) if "```" in page.read_text()]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-STOPPED = tuple(f"{name}:" for name in _core.Outcome.__members__ if name != "right")
+STOPPED = tuple(f"{name}:" for name in _core.Outcome.__members__ if name != "right") + ("data_not_finite:",)
 OWN_PROCESS = ("--petsc", "--log", "|", ">")
 
 
@@ -110,7 +110,7 @@ def test_every_term_of_the_ledger_is_explained() -> None:
 
 def test_every_outcome_is_explained() -> None:
     text = (DOCS / "messages.md").read_text()
-    for name in (*_core.Outcome.__members__, "interrupted"):
+    for name in (*_core.Outcome.__members__, "data_not_finite", "interrupted"):
         assert f"`{name}`" in text, name
 
 
