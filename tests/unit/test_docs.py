@@ -25,7 +25,7 @@ from warmslip import _core, cli, interruption
 DOCS = Path(__file__).parents[2] / "python" / "docs"
 PAGES = [page for page in sorted(DOCS.rglob("*.md")) if "```" in page.read_text()]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-STOPPED = tuple(f"{name}:" for name in _core.Outcome.__members__ if name != "right") + ("data_not_finite:",)
+STOPPED = ("data_not_finite:", *(f"{name}:" for name in _core.Outcome.__members__ if name != "right"))
 OWN_PROCESS = ("--petsc", "--log", "|", ">")
 
 
