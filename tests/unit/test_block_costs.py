@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +53,3 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
     assert all(r["over_floor"] > 0 and r["absent"] > 0 and r["unknowns"] == 75 for r in rows)
     wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
     assert wrong.returncode == 2 and "no multiple of 5" in wrong.stderr
-
-
-def test_committed_table() -> None:
-    """What is committed covers every combination, and its counts are those of the blocks that are there."""
-    path = Path(__file__).parents[2] / "results/tradeoff/blocks.csv"
-    rows = list(csv.DictReader(path.open()))
-    assert [{key: row[key] for key in ALL[0]} for row in rows] == ALL
-    for row in rows:
-        assert float(row["substitutions"]) == (row["motion"] != "none") + (row["heat"] != "none")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import subprocess
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+
+from warmslip import blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 CI = "workflows/config/ci.yaml"
@@ -123,3 +126,13 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     report = snakemake("--report", "report.html", *small)
     assert report.returncode == 0, report.stderr
     assert (tmp_path / "report.html").stat().st_size > 2**20
+
+
+def test_committed_costs_are_of_every_combination() -> None:
+    """And their counts are those of the blocks that are there."""
+    chosen = list(blocks.combinations())
+    with (ROOT / "results/tradeoff/blocks.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [{key: row[key] for key in chosen[0]} for row in rows] == chosen
+    for row in rows:
+        assert float(row["substitutions"]) == (row["motion"] != "none") + (row["heat"] != "none")
