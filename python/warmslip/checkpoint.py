@@ -36,6 +36,7 @@ def _owner(job: Run) -> dict[str, Any]:
         "code": _fingerprint(),
         "solver": job.stepper.solver,
         "ranks": job.comm.size,
+        "functions": job.discretisation.own,  # their names; what they compute nobody can compare
     }
 
 

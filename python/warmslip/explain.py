@@ -131,8 +131,12 @@ def plan(scene: Scene) -> Plan:
     if coupled:
         steps.append("one substitution with the factor of both fields")
     else:
-        steps += ["one substitution with the factor of rho M/k + B + k A"] if moves else []
-        steps += ["one substitution with the factor of M/k + D + J"] if heat else []
+        motion = {"rho M/k": inertial, "B": scene.viscosity is not None, "k A": scene.elasticity is not None}
+        warmth = {"M/k": True, "D": True, "J": present["J, heat exchange"]}
+        for there, sums in ((moves, motion), (heat is not None, warmth)):
+            steps += (
+                [f"one substitution with the factor of {' + '.join(k for k, v in sums.items() if v)}"] if there else []
+            )
     if touching:
         kind = "semismooth Newton on the contact points"
         kept = d == 2 and all(_piecewise_linear(c) for c in touching)

@@ -31,6 +31,7 @@ class Discretisation:
     norms: Any
     load_vectors: LoadVectors
     laws: dict[str, Law]
+    own: list[str]  # what took the place of the scene's: "loads", "laws.PART"
 
     @property
     def dim(self) -> int:
@@ -159,6 +160,7 @@ def discretise(
 
     comm = MPI.COMM_WORLD if comm is None else comm
     d = scene.mesh.dim
+    own = [*(["loads"] if loads is not None else []), *(f"laws.{part}" for part in sorted(laws or {}))]
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
     laws = _checked(laws or {}, scene, mesh)
@@ -191,6 +193,7 @@ def discretise(
         of_dim("Norms", d)(layout),
         vectors,
         laws,
+        own,
     )
 
 

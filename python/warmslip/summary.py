@@ -37,11 +37,10 @@ def summary(job: Run) -> dict[str, Any]:
         "failure": job.failure,
         "time": s.time,
         "steps": job.taken,
+        "functions": job.discretisation.own,
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
-        "contact": contact
-        | counts
-        | {"traction": traction, "parts": parts, "own_laws": sorted(job.discretisation.laws)},
+        "contact": contact | counts | {"traction": traction, "parts": parts},
         "identities": job.worst | job.floors,
         "newton": {
             "iterations": cost.newton_iterations,

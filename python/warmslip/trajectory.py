@@ -276,10 +276,18 @@ class Trajectory:
         return self._file[f"contact/{name}"][step]
 
     def discretisation(self) -> Discretisation:
-        """The scene assembled again on this process, with the loads and laws that it states."""
+        """The scene assembled again on this process, with the loads and laws that it states.
+
+        Raises ValueError when that is not the mesh of the run, as its file has changed since.
+        """
         from mpi4py import MPI
 
-        return discretise(build(self.scene), comm=MPI.COMM_SELF)
+        found = discretise(build(self.scene), comm=MPI.COMM_SELF)
+        if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
+            raise ValueError(
+                f"{self.path}: its scene gives another mesh than it was run on; put the mesh file back as it was"
+            )
+        return found
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""

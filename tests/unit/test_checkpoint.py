@@ -214,3 +214,12 @@ def test_ctrl_c_ends_with_its_own_exit_code(tmp_path: Path, ranks: int) -> None:
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 130 or ranks > 1  # mpirun has an exit code of its own
     assert process.returncode != 0 and "--resume goes on" in said
+
+
+def test_a_run_with_functions_is_not_resumed_without_them(tmp_path: Path) -> None:
+    law = {"bottom": warmslip.Law(friction=lambda p, s: (0.1 * p, 0.1, 0.0))}
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, laws=law, progress=stop_after(7))
+    with pytest.raises(ValueError, match="is of another functions"):
+        warmslip.run(scene(), out=tmp_path, resume=True)
+    assert warmslip.run(scene(), out=tmp_path, laws=law, resume=True).summary["steps"] == 24

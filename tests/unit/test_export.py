@@ -15,6 +15,7 @@ from conftest import Command
 import warmslip
 from warmslip import Trajectory
 from warmslip.export import export
+from warmslip.mesh_files import find
 
 
 @pytest.mark.parametrize("name", ["plate_with_hole", "block_with_hole", "heat_slab"])
@@ -86,3 +87,19 @@ def test_the_gap_is_the_one_that_was_used(tmp_path: Path) -> None:
     for i, gap in enumerate(seen, start=1):
         written = meshio.read(tmp_path / f"series/contact_{i:04d}.vtu").point_data["gap"]
         assert np.allclose(written, gap, rtol=1e-14) and abs(gap.mean()) > 0.01
+
+
+def test_a_mesh_file_that_has_changed_is_noticed(tmp_path: Path) -> None:
+    for name in ("heat.toml", "plate.msh"):
+        (tmp_path / name).write_bytes(
+            find("plate_with_hole.msh").read_bytes()
+            if name == "plate.msh"
+            else b"mesh.file = 'plate.msh'\ntime.steps = 1\nheat.conductivity = 1.0\n"
+        )
+    warmslip.run(warmslip.load(tmp_path / "heat.toml"), out=tmp_path / "run")
+    assert export(tmp_path / "run", tmp_path / "series") == 2
+    plate = meshio.gmsh.read(tmp_path / "plate.msh")
+    plate.points *= 1.5
+    meshio.write(tmp_path / "plate.msh", plate, file_format="gmsh22")
+    with pytest.raises(ValueError, match="gives another mesh than it was run on"):
+        export(tmp_path / "run", tmp_path / "series")
