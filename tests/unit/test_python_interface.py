@@ -150,6 +150,8 @@ def test_resultants_of_every_part(tmp_path: Path) -> None:
     pressing = [parts["normal_force bottom"], parts["normal_force left"]]
     assert sum(pressing) == pytest.approx(contact["normal_force"], rel=1e-12) and min(pressing) > 0
     with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
-        at = stored.series("contact")
+        at, friction = stored.series("contact"), stored.series("steps")["friction_traction"][-1]
+    on_body = [sum(parts[f"friction_{axis} {part}"] for part in ("bottom", "left")) for axis in "xy"]
+    assert on_body == pytest.approx(friction, rel=1e-9) and max(map(abs, on_body)) > 1e-3
     assert set(at["part"]) == {0, 1}
     assert (at["normals"][at["part"] == 1] == [-1, 0]).all()
