@@ -10,6 +10,7 @@ from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILLION, column, grid_lines, number, rows
 
@@ -78,6 +79,10 @@ def _floor(ax: Axes, lines: list[dict[str, str]]) -> str:
         ax.text(ends[1], factor * ends[1], f" {factor:g}", fontsize=7.5, color=GREY, va="center")
     ax.set(xscale="log", yscale="log", xlabel="right-hand sides, substitutions, contact solver, ms a step")
     ax.set_ylabel("warmslip with its balances, ms a step")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(lambda value, _: number(value))
+        axis.set_minor_formatter(NullFormatter())
     grid_lines(ax)
     handles = [
         Line2D([], [], marker="o", ls="", color=c, label="no motion" if m == "none" else m) for m, c in COLOURS.items()
