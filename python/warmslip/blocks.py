@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from warmslip.runner import Run
 from warmslip.scene import Scene, load
@@ -174,12 +175,14 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
 def table(n: int, steps: int, progress: Callable[[int, int], None] | None = None) -> list[dict[str, Any]]:
     """Every combination on a square of n x n bricks, each beside the whole model in the same run.
 
-    Raises ValueError for a number of steps that is no multiple of 5.
+    Raises ValueError for a number of steps that is no multiple of 5, and on several ranks.
     """
     if steps % CHUNK or steps < 2 * CHUNK:
         raise ValueError(
             f"steps = {steps} is no multiple of {CHUNK}, or less than two of them; give {2 * CHUNK} or more"
         )
+    if MPI.COMM_WORLD.size > 1:
+        raise ValueError("the cost of blocks is measured on one process; start it without mpirun")
     full, chosen = whole(n, steps), list(combinations())
     rows = []
     for i, one in enumerate(chosen, start=1):
