@@ -1,4 +1,5 @@
-"""Coverage-guided fuzzing of one reader, by Atheris: `python fuzz.py READER FOLDER... [options of libFuzzer]`."""
+#!/usr/bin/env python
+"""Coverage-guided fuzzing of one reader, by Atheris: `fuzz.py --reader=READER FOLDER... [options of libFuzzer]`."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ with atheris.instrument_imports(include=["warmslip", "tomllib"]):
 
 
 def main() -> None:
-    reader = READERS[sys.argv.pop(1)]
+    # libFuzzer passes over what begins with two dashes and hands it on to the processes of a merge, which start this file
+    reader = READERS[next(word for word in sys.argv if word.startswith("--reader=")).removeprefix("--reader=")]
     checkpoint._owner = owner
 
     def one(data: bytes) -> None:
