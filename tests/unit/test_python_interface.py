@@ -155,3 +155,13 @@ def test_resultants_of_every_part(tmp_path: Path) -> None:
     assert on_body == pytest.approx(friction, rel=1e-9) and max(map(abs, on_body)) > 1e-3
     assert set(at["part"]) == {0, 1}
     assert (at["normals"][at["part"] == 1] == [-1, 0]).all()
+
+
+def test_a_law_is_that_of_its_part_alone() -> None:
+    scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 4})
+    one = scene.resolved()["contact"]
+    held = {"supports.displacement": ["top"], "supports.temperature": ["top"], "loads.body": [-3.0, -1.0]}
+    parts = [one | {"stiffness": 100.0}, one | {"part": "left", "stiffness": STIFF}]
+    scene = scene.override(contact=parts, **held)
+    told, own = warmslip.run(scene), warmslip.run(scene, laws={"left": Law(compliance=linear)})
+    assert np.abs(own.u - told.u).max() < 1e-13 and np.abs(told.u).max() > 1e-2
