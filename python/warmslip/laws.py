@@ -22,12 +22,17 @@ class Law:
     integral of p_nu from 0 to r; where r <= 0 nothing presses. `friction(pressure, speed)` gives the friction bound (stress) and
     its derivatives by the pressure and by the slip speed. Both are called with floats at every contact point in every iteration,
     which is slower than the laws of the scene. They generalise (2.8) and (2.9) of the paper: neither pressure nor bound may be
-    negative, and the pressure must not fall as r grows. A derivative that is wrong costs iterations, never accuracy; an
-    energy that is wrong stops the run with `identity_violated`.
+    negative, and the pressure must not fall as r grows. They are tried on samples before the run, and beyond the samples they are
+    believed: a derivative that is wrong there costs iterations, an energy that is wrong misstates the contact energy and the
+    damping of the ledger, and what they raise ends the run as it is.
     """
 
     compliance: Callable[[float], Sequence[float]] | None = None
     friction: Callable[[float, float], Sequence[float]] | None = None
+
+    def names(self, part: str) -> list[str]:
+        """Which functions there are."""
+        return [f"laws.{part}.{name}" for name in ("compliance", "friction") if getattr(self, name) is not None]
 
     def check(self, part: str, length: float) -> None:
         """Tries the functions on penetrations up to a hundredth of `length`, the pressures these give, and slip speeds.
@@ -73,6 +78,11 @@ def _integrates(name: str, r: Array, pressure: Array, energy: Array) -> None:
     rounding = 1e-12 * np.abs(energy[1:])
     for i in np.flatnonzero(low > high):
         raise ValueError(f"{name}: the pressure falls from r = {r[i]:.3g} to {r[i + 1]:.3g}; it must not")
+    for i in np.flatnonzero((energy < 0) | (energy > r * pressure * (1 + 1e-9))):
+        raise ValueError(
+            f"{name}({r[i]:.3g}): the energy is {energy[i]:.6g}, and the integral of the pressure from 0 lies between 0 and "
+            f"{r[i] * pressure[i]:.6g}; it starts at 0"
+        )
     for i in np.flatnonzero((grown < low - rounding) | (grown > high + rounding)):
         raise ValueError(
             f"{name}: from r = {r[i]:.3g} to {r[i + 1]:.3g} the energy grows by {grown[i]:.6g} and the pressure gives "

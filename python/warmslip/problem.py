@@ -31,7 +31,7 @@ class Discretisation:
     norms: Any
     load_vectors: LoadVectors
     laws: dict[str, Law]
-    own: list[str]  # what took the place of the scene's: "loads", "laws.PART"
+    own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
 
     @property
     def dim(self) -> int:
@@ -65,14 +65,15 @@ class Discretisation:
         )
         x, initial = np.asarray(self.mesh.nodes), scene.initial
 
-        def start(value: Any) -> Array:
-            return evaluate(data(value) if value is not None else 0.0, x, 0.0, self.dim)
+        def start(name: str, components: int) -> Array:
+            value = getattr(initial, name)
+            return evaluate(data(value) if value is not None else 0.0, x, 0.0, components, f"initial.{name}")
 
         return self.restart(
             stepper,
-            start(initial.displacement),
-            start(initial.velocity),
-            evaluate(data(initial.temperature), x, 0.0, 1)[:, 0],
+            start("displacement", self.dim),
+            start("velocity", self.dim),
+            start("temperature", 1)[:, 0],
             0.0,
         )
 
@@ -160,7 +161,10 @@ def discretise(
 
     comm = MPI.COMM_WORLD if comm is None else comm
     d = scene.mesh.dim
-    own = [*(["loads"] if loads is not None else []), *(f"laws.{part}" for part in sorted(laws or {}))]
+    own = [
+        *(["loads"] if loads is not None else []),
+        *(name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)),
+    ]
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
     laws = _checked(laws or {}, scene, mesh)

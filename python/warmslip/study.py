@@ -101,6 +101,8 @@ def study(
     Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
     Raises RuntimeError naming the member when a run does not end right.
     """
+    if scene.mesh.refine:
+        raise SceneError("mesh.refine: the levels of a study refine the file themselves; leave it out")
     if any(ratio != 1 for ratio in scene.mesh.grading or []):
         raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
     pace = scene.time.steps if scene.mesh.file is not None else 1

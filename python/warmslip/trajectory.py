@@ -54,6 +54,8 @@ class TrajectoryWriter:
             os.replace(path, earlier)
         file = self._file = h5py.File(path, "w", libver="latest")
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
+        file.attrs["digest"] = discretisation.scene.digest()
+        file.attrs["functions"] = json.dumps(discretisation.own)
         file["mesh/nodes"] = discretisation.mesh.nodes
         file["mesh/cells"] = discretisation.mesh.cells
         for name, facets in discretisation.mesh.parts.items():
@@ -282,12 +284,20 @@ class Trajectory:
         """
         from mpi4py import MPI
 
-        found = discretise(build(self.scene), comm=MPI.COMM_SELF)
-        if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
+        scene = build(self.scene)
+        if scene.mesh.file is not None and scene.digest() != self._file.attrs.get("digest"):
             raise ValueError(
-                f"{self.path}: its scene gives another mesh than it was run on; put the mesh file back as it was"
+                f"{self.path}: mesh file '{scene.mesh.file}' has changed since the run; put it back as it was"
             )
+        found = discretise(scene, comm=MPI.COMM_SELF)
+        if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
+            raise ValueError(f"{self.path}: it was run on another mesh than its scene gives; read it through Python")
         return found
+
+    @property
+    def functions(self) -> list[str]:
+        """What Python functions took the place of the scene's: `loads`, `laws.PART.compliance` ..."""
+        return list(json.loads(self._file.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""

@@ -45,7 +45,7 @@ def view(
     """
     folder = Path(out)
     with opened(run) as t, style.applied():
-        d = t.discretisation()
+        d, functions = t.discretisation(), t.functions
         folder.mkdir(parents=True, exist_ok=True)
         here = state_number(t, at)
         found: dict[str, tuple[Any, str]] = {}
@@ -69,7 +69,7 @@ def view(
             (folder / "animation.rst").write_text(f"{name} on the deformed body, {len(chosen)} states.\n")
             files.append(folder / "animation.gif")
     page = folder / "report.html"
-    page.write_text(_page(Path(run), t.scene, files))
+    page.write_text(_page(Path(run), t.scene, functions, files))
     return [*files, page]
 
 
@@ -192,7 +192,7 @@ def _history(t: Trajectory, d: Discretisation) -> dict[str, dict[str, Array]]:
     return {title: series for title, series in panels.items() if series}
 
 
-def _page(run: Path, scene: dict[str, Any], files: list[Path]) -> str:
+def _page(run: Path, scene: dict[str, Any], functions: list[str], files: list[Path]) -> str:
     """The report; a run that was killed has no summary."""
     summary_file = run / "summary.json"
     summary = json.loads(summary_file.read_text()) if summary_file.exists() else None
@@ -205,6 +205,7 @@ def _page(run: Path, scene: dict[str, Any], files: list[Path]) -> str:
     )
     return environment.get_template("report.html").render(
         scene=scene,
+        functions=functions,
         summary=summary,
         images=images,
         plan=explain.text(explain.plan(build(scene))),

@@ -49,7 +49,10 @@ def test_the_scenes_own_law_written_in_python_gives_the_same(
     assert not caplog.records
     own = warmslip.run(scene, laws={"bottom": Law(compliance=linear, friction=coulomb)})
     assert own.right and np.abs(own.u - told.u).max() < 1e-13 and np.abs(told.u).max() > 1e-3
-    assert own.summary["functions"] == ["laws.bottom"] and told.summary["functions"] == []
+    assert (
+        own.summary["functions"] == ["laws.bottom.compliance", "laws.bottom.friction"]
+        and told.summary["functions"] == []
+    )
     assert "slower" in caplog.text
     weaker = warmslip.run(scene, laws={"bottom": Law(friction=lambda p, s: (0.9 * MU * p, 0.9 * MU, 0.0))})
     assert np.abs(weaker.u - told.u).max() > 1e-6
@@ -67,6 +70,7 @@ def test_an_exponential_law_closes_its_books(small: Small) -> None:
     ("law", "sentence"),
     [
         (Law(compliance=lambda r: (r, 1.0, r**2)), "third value is the integral of the first"),
+        (Law(compliance=lambda r: (r, 1.0, r**2 / 2 + 3)), "it starts at 0"),
         (Law(compliance=lambda r: (r, 2.0, r**2 / 2)), "correct the second value"),
         (Law(compliance=lambda r: (1 / r, -1 / r**2, math.log(r))), "must not"),
         (Law(compliance=lambda r: (-r, -1.0, -(r**2) / 2)), "negative"),

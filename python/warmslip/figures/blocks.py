@@ -30,7 +30,7 @@ def blocks(inputs: list[Path]) -> tuple[Figure, str]:
     lines = rows(inputs[0])
     figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.0), width_ratios=(1.5, 1))
     said = [_matrix(left, lines), _floor(right, lines)]
-    absent = float(column(lines, "absent").max())
+    absent = float(np.nanmax(column(lines, "absent")))
     return figure, (
         f"Cost of a step of {len(lines)} combinations of blocks, medians on one process, {lines[0]['bricks']} bricks a "
         f"side. {said[0]} {said[1]} Beside the contact solver no combination takes more than {number(absent)} times what the "
@@ -97,6 +97,7 @@ def _floor(ax: Axes, lines: list[dict[str, str]]) -> str:
     linear = np.array([line["contact"] == "none" for line in lines])
     return (
         f"Right, {number(float(np.median(over[linear])))} times the least code in the middle of the linear ones (one "
-        f"substitution a field and nothing else but the balances), {number(float(over[linear].max()))} at most; with contact "
+        f"substitution a field; the step closes its balances, the least code does not), "
+        f"{number(float(over[linear].max()))} at most; with contact "
         f"{number(float(np.median(over[~linear])))} and {number(float(over[~linear].max()))}."
     )
