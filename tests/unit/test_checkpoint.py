@@ -194,7 +194,9 @@ def test_an_interrupted_run_is_resumable(tmp_path: Path, number: signal.Signals)
     assert signal.getsignal(number) is before
     assert torn.outcome == "interrupted" and not torn.right and torn.summary["steps"] == 8
     assert json.loads((tmp_path / "torn" / "summary.json").read_text())["outcome"] == "interrupted"
-    again = warmslip.run(scene(), out=tmp_path / "torn", resume=True)
+    taken: list[int] = []
+    again = warmslip.run(scene(), out=tmp_path / "torn", resume=True, progress=lambda step, *_: taken.append(step))
+    assert taken[0] == 9  # from where it was, not from the checkpoint of step 5
     assert again.right and np.array_equal(again.u, whole.u) and np.array_equal(again.theta, whole.theta)
     assert not (tmp_path / "torn" / "checkpoint.npz").exists()
 
