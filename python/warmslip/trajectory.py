@@ -233,7 +233,10 @@ class Trajectory:
     def __init__(self, path: str | Path) -> None:
         """Raises OSError when the file cannot be opened, ValueError when it is no trajectory or a damaged one."""
         self.path = Path(path)
-        self._file = h5py.File(self.path, "r")
+        try:
+            self._file = h5py.File(self.path, "r")
+        except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
+            self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
         try:
             self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
             _check(self._file)
