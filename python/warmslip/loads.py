@@ -106,7 +106,7 @@ def evaluate(data: Data, x: Array, t: float, components: int, what: str = "a loa
     value = np.asarray(data(x, t) if callable(data) else data, dtype=float)
     if value.ndim < 2 and components == 1 and value.shape in ((), (len(x),)):
         value = np.broadcast_to(value, (len(x),))[:, None]
-    elif value.ndim < 2:
+    elif value.shape in ((), (components,)):
         value = np.broadcast_to(value, (len(x), components))
     if value.shape != (len(x), components):
         raise ValueError(f"{what} must give shape {(len(x), components)} at {len(x)} points, got {value.shape}")

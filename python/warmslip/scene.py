@@ -13,7 +13,7 @@ from typing import Annotated, Any, Self, TypeVar, get_args, get_origin
 
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
-from warmslip import mesh_files
+from warmslip import full_tables, mesh_files
 from warmslip import tables as t
 from warmslip.consistency import problems
 from warmslip.expressions import told
@@ -162,11 +162,11 @@ class FullScene(Scene):
     inertia: t.InertiaTable
     elasticity: t.IsotropicTable
     viscosity: t.IsotropicTable
-    heat: t.FullHeatTable
-    loads: t.FullLoadsTable
-    supports: t.FullSupportsTable
-    contact: t.FullContactTable
-    initial: t.FullInitialTable = t.FullInitialTable()
+    heat: full_tables.FullHeatTable
+    loads: full_tables.FullLoadsTable
+    supports: full_tables.FullSupportsTable
+    contact: full_tables.FullContactTable
+    initial: full_tables.FullInitialTable = full_tables.FullInitialTable()
 
 
 S = TypeVar("S", bound=Scene)
