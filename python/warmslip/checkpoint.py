@@ -120,6 +120,15 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
         return False
 
 
+def _ended(folder: Path, job: Run) -> str:
+    """What to say when the run that ended in the folder was of another scene: it would be overwritten."""
+    try:
+        scene = json.loads((folder / "summary.json").read_text())["stamp"]["scene_hash"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return ""
+    return "" if scene == job.scene.digest() else f"{folder / 'summary.json'} is of another scene"
+
+
 def load(folder: Path, job: Run) -> int:
     """Brings a new run to the newest whole checkpoint of its own in `folder`; the step it goes on from, 0 if there is none.
 
@@ -139,6 +148,8 @@ def load(folder: Path, job: Run) -> int:
                 found = whole
                 break
             foreign = f"{folder / name} is of another {' and '.join(other)}"
+        if found is None and not foreign:
+            foreign = _ended(folder, job)
     found, foreign = job.comm.bcast((found, foreign), root=0)
     if found is None:
         if foreign:

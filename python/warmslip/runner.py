@@ -168,13 +168,15 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        stale = () if resume else checkpoint.NAMES
-        for name in ("summary.json", "final.vtu", *stale):  # they would speak of another run
-            (folder / name).unlink(missing_ok=True)
+        if not resume:
+            _clear(folder, *checkpoint.NAMES)
     job = Run(scene, comm=comm, loads=loads, laws=laws, backend=backend)
     rank = job.comm.rank
     path = folder / "trajectory.h5" if folder is not None else None
-    begin = job.resume(folder) if resume and folder is not None else 0
+    begin = 0
+    if resume and folder is not None:
+        begin = job.resume(folder)
+        _clear(folder)
     minutes, saved = scene.output.checkpoint_minutes, time.monotonic()
     with (
         Interruption() as stop,
@@ -199,6 +201,12 @@ def run(
         for name in checkpoint.NAMES:  # the run is over
             (folder / name).unlink(missing_ok=True)
     return finish(job, folder)
+
+
+def _clear(folder: Path, *more: str) -> None:
+    """Removes what would speak of another run."""
+    for name in ("summary.json", "final.vtu", *more):
+        (folder / name).unlink(missing_ok=True)
 
 
 def finish(job: Run, folder: Path | None) -> Result:

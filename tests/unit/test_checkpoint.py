@@ -225,3 +225,11 @@ def test_a_run_with_functions_is_not_resumed_without_them(tmp_path: Path) -> Non
     with pytest.raises(ValueError, match="is of another functions"):
         warmslip.run(scene(), out=tmp_path, resume=True)
     assert warmslip.run(scene(), out=tmp_path, laws=law, resume=True).summary["steps"] == 24
+
+
+def test_the_end_of_another_scene_is_not_overwritten(tmp_path: Path) -> None:
+    warmslip.run(scene(), out=tmp_path)
+    with pytest.raises(ValueError, match=r"summary.json is of another scene; run it as it was"):
+        warmslip.run(scene("contact.stiffness=20.0"), out=tmp_path, resume=True)
+    assert json.loads((tmp_path / "summary.json").read_text())["stamp"]["scene_hash"] == scene().digest()
+    assert warmslip.run(scene(), out=tmp_path, resume=True).right
