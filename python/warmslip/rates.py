@@ -44,6 +44,8 @@ def corrected(coarse: float, fine: float, h: float, reference: float, *, quadrat
     errors are orthogonal, so a plain ratio flatters: a true first order shows 1.58 at the last halving of 1/16 .. 1/128
     against 1/256. `h` belongs to `coarse`, h/ratio to `fine`. nan when no p in (0.02, 8) fits.
     """
+    if not (coarse > 0 and fine > 0):  # of a field that is not there
+        return float("nan")
     r = h / reference
     target = (coarse / fine) ** (2 if quadratic else 1)
 

@@ -239,3 +239,7 @@ def test_tables_survive_the_disk(tmp_path: Path) -> None:
     assert list(back) == list(row)
     assert isinstance(back["n"], int)
     np.testing.assert_equal(back, row)
+
+
+def test_a_field_that_is_not_there_has_no_order() -> None:
+    assert np.isnan(rates.corrected(0.0, 0.0, 0.25, 0.0625, quadratic=False))
