@@ -165,6 +165,7 @@ void bind_stepper(py::module_& m) {
   item("momentum_seconds", &Cost::momentum_seconds);
   item("contact_seconds", &Cost::contact_seconds);
   item("heat_seconds", &Cost::heat_seconds);
+  item("books_seconds", &Cost::books_seconds);
   item("steps", &Cost::steps);
   item("refinements", &Cost::refinements);
   item("substitutions", &Cost::substitutions);

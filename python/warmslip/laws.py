@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +14,11 @@ from warmslip.loads import Array
 
 AGREEING = 0.9  # share of the samples whose derivative must be the difference quotient: a law may have kinks
 NEAR = 1e-3  # how close the two must be, relative
+EXACT = 1e-9  # relative, of an energy against its pressure: an energy found by quadrature may be so far off
+CANCELLED = 1e-12  # relative to the largest met: a formula may lose the digits of small values
+APART = 1.02  # ratio of the penetrations that are remembered
+
+Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,79 +29,163 @@ class Law:
     integral of p_nu from 0 to r; where r <= 0 nothing presses. `friction(pressure, speed)` gives the friction bound (stress) and
     its derivatives by the pressure and by the slip speed. Both are called with floats at every contact point in every iteration,
     which is slower than the laws of the scene. They generalise (2.8) and (2.9) of the paper: neither pressure nor bound may be
-    negative, and the pressure must not fall as r grows. They are tried on samples before the run, and beyond the samples they are
-    believed: a derivative that is wrong there costs iterations, an energy that is wrong misstates the contact energy and the
-    damping of the ledger, and what they raise ends the run as it is.
+    negative, and the pressure must not fall as r grows.
+
+    They are tried on samples before the run. In the run every value is checked: three finite numbers, no negative pressure or
+    bound, and a pressure and an energy that go with those of all other penetrations met so far. A step that meets another ends
+    the run with the outcome `law_failed` and the place. A derivative that is wrong beyond the samples costs iterations, no more.
+    Raises ValueError for a law without functions, TypeError for one that cannot be called.
     """
 
     compliance: Callable[[float], Sequence[float]] | None = None
     friction: Callable[[float, float], Sequence[float]] | None = None
 
+    def __post_init__(self) -> None:
+        if self.compliance is None and self.friction is None:
+            raise ValueError("a Law needs a function; give compliance=, friction= or both")
+        for name in ("compliance", "friction"):
+            function = getattr(self, name)
+            if function is not None and not callable(function):
+                raise TypeError(f"Law({name}={function!r}) is no function; give one that can be called")
+
     def names(self, part: str) -> list[str]:
         """Which functions there are."""
         return [f"laws.{part}.{name}" for name in ("compliance", "friction") if getattr(self, name) is not None]
 
-    def check(self, part: str, length: float) -> None:
-        """Tries the functions on penetrations up to a hundredth of `length`, the pressures these give, and slip speeds.
+    def tried(self, part: str, length: float) -> Watched:
+        """The functions, tried on penetrations up to a hundredth of `length`, the pressures these give, and slip speeds.
 
         Raises ValueError with the place where a function is not what it should be.
         """
+        watched = Watched.of(part, self)
         pressures = np.geomspace(1e-6, 1e2, 9)
-        if self.compliance is not None:
-            name, r = f"laws.{part}.compliance", np.geomspace(1e-8, 1e-2, 61) * length
-            p, _, energy = _sampled(name, self.compliance, r[:, None])
-            _integrates(name, r, p, energy)
-            _derives(name, self.compliance, r[:, None], axis=0)
-            pressures = p[::8]
-        if self.friction is not None:
-            name = f"laws.{part}.friction"
-            places = np.array([(p, speed) for p in pressures if p > 0 for speed in np.geomspace(1e-3, 10, 9)])
-            rest = np.column_stack([pressures, 0 * pressures])
-            _sampled(name, self.friction, np.vstack([[[0.0, 0.0]], rest]))
-            for axis in (0, 1) if len(places) else ():
-                _derives(name, self.friction, places, axis=axis)
+        if watched.compliance is not None:
+            r = np.geomspace(1e-8, 1e-2, 61) * length
+            pressures = np.array([watched.compliance.tried(float(one))[0] for one in r])[::8]
+            _derives(watched.compliance, r[:, None], axis=0)
+        if watched.friction is not None:
+            for p in (0.0, *pressures):
+                watched.friction.tried(float(p), 0.0)
+            places = [(p, speed) for p in pressures if p > 0 for speed in np.geomspace(1e-3, 10, 9)]
+            for axis in (0, 1) if places else ():
+                _derives(watched.friction, np.array(places), axis=axis)
+        return watched
 
 
-def _sampled(name: str, law: Callable[..., Any], places: Array) -> Array:
-    """The three values at the places (n, arguments), as (3, n)."""
-    rows = []
-    for place in places:
+class Watch:
+    """A function of a law as the core calls it: what it gives is tried each time, and what cannot be becomes nan.
+
+    The step that meets a nan fails, on all ranks alike; `wrong` then has the first reason since it was last set to None.
+    """
+
+    def __init__(self, name: str, function: Callable[..., Sequence[float]]) -> None:
+        self.name, self._function = name, function
+        self.wrong: str | None = None
+
+    def __call__(self, *place: float) -> Triple:
+        nothing = (math.nan, math.nan, math.nan)
+        if not all(map(math.isfinite, place)):  # the step has failed before
+            return nothing
+        try:
+            return self.tried(*place)
+        except ValueError as error:
+            self.wrong = self.wrong or str(error)
+            return nothing
+
+    def tried(self, *place: float) -> Triple:
+        """The three values. Raises ValueError with the place for what is no value of a law."""
         at = ", ".join(f"{x:.3g}" for x in place)
         try:
-            row = np.array([float(value) for value in law(*map(float, place))])
+            one, two, three = (float(value) for value in self._function(*place))
         except Exception as error:
-            raise ValueError(f"{name}({at}) raised {error!r}; it must give three numbers") from error
-        if row.shape != (3,) or not np.isfinite(row).all():
-            raise ValueError(f"{name}({at}) gave {row.tolist()}; it must give three finite numbers")
-        if row[0] < 0:
-            raise ValueError(f"{name}({at}) gave {row[0]:.3g}, which is negative; a pressure or a bound is not")
-        rows.append(row)
-    return np.array(rows).T
+            raise ValueError(f"{self.name}({at}) raised {error!r}; it must give three numbers") from error
+        if not (math.isfinite(one) and math.isfinite(two) and math.isfinite(three)):
+            raise ValueError(f"{self.name}({at}) gave {[one, two, three]}; it must give three finite numbers")
+        if one < 0:
+            raise ValueError(f"{self.name}({at}) gave {one:.3g}, which is negative; a pressure or a bound is not")
+        return one, two, three
 
 
-def _integrates(name: str, r: Array, pressure: Array, energy: Array) -> None:
-    """The energy of a pressure that does not fall grows by something between the lower and the upper rectangle."""
-    low, high, grown = pressure[:-1] * np.diff(r), pressure[1:] * np.diff(r), np.diff(energy)
-    rounding = 1e-12 * np.abs(energy[1:])
-    for i in np.flatnonzero(low > high):
-        raise ValueError(f"{name}: the pressure falls from r = {r[i]:.3g} to {r[i + 1]:.3g}; it must not")
-    for i in np.flatnonzero((energy < 0) | (energy > r * pressure * (1 + 1e-9))):
-        raise ValueError(
-            f"{name}({r[i]:.3g}): the energy is {energy[i]:.6g}, and the integral of the pressure from 0 lies between 0 and "
-            f"{r[i] * pressure[i]:.6g}; it starts at 0"
+class Pressing(Watch):
+    """A compliance, which must also agree with itself: between two penetrations the energy grows by the pressure."""
+
+    def __init__(self, name: str, function: Callable[..., Sequence[float]]) -> None:
+        super().__init__(name, function)
+        self._met = [(0.0, 0.0, 0.0)]  # penetration, pressure, energy: ascending, at least a ratio APART
+        self._most = 0.0, 0.0  # pressure and energy
+
+    def tried(self, *place: float) -> Triple:
+        (r,) = place
+        pressure, slope, energy = super().tried(r)
+        self._most = max(self._most[0], pressure), max(self._most[1], energy)
+        here, at = (r, pressure, energy), bisect.bisect(self._met, (r,))
+        under, over = self._met[at - 1], self._met[at : at + 1]
+        pairs = [(under, here), *((here, one) for one in over)]
+        for pair in pairs:
+            self._does_not_fall(*pair)
+        off = CANCELLED * self._most[1]
+        if not -off <= energy <= r * pressure * (1 + EXACT) + off:
+            raise ValueError(
+                f"{self.name}({r:.3g}): the energy is {energy:.6g}, and the integral from 0 of a pressure that does not "
+                f"fall lies between 0 and {r * pressure:.6g}; it starts at 0"
+            )
+        for pair in pairs:
+            self._is_the_integral(*pair)
+        if r > APART * under[0] and all(one[0] > APART * r for one in over):
+            self._met.insert(at, here)
+        return pressure, slope, energy
+
+    def _does_not_fall(self, one: Triple, other: Triple) -> None:
+        if one[1] > other[1] * (1 + EXACT) + CANCELLED * self._most[0]:
+            raise ValueError(f"{self.name}: the pressure falls from r = {one[0]:.3g} to {other[0]:.3g}; it must not")
+
+    def _is_the_integral(self, one: Triple, other: Triple) -> None:
+        """The energy of a pressure that does not fall grows by something between the lower and the upper rectangle."""
+        (r, p, energy), (r_next, p_next, energy_next) = one, other
+        low, high, grown = p * (r_next - r), p_next * (r_next - r), energy_next - energy
+        off = EXACT * energy_next + CANCELLED * self._most[1]
+        if not low - off <= grown <= high + off:
+            raise ValueError(
+                f"{self.name}: from r = {r:.3g} to {r_next:.3g} the energy grows by {grown:.6g} and the pressure gives "
+                f"{low:.6g} to {high:.6g}; the third value is the integral of the first"
+            )
+
+
+@dataclass(frozen=True)
+class Watched:
+    """The functions of a law in the hands of one problem."""
+
+    compliance: Pressing | None = None
+    friction: Watch | None = None
+
+    @classmethod
+    def of(cls, part: str, law: Law) -> Watched:
+        """The functions of the law of a contact part, of which nothing is known yet."""
+        return cls(
+            law.compliance and Pressing(f"laws.{part}.compliance", law.compliance),
+            law.friction and Watch(f"laws.{part}.friction", law.friction),
         )
-    for i in np.flatnonzero((grown < low - rounding) | (grown > high + rounding)):
-        raise ValueError(
-            f"{name}: from r = {r[i]:.3g} to {r[i + 1]:.3g} the energy grows by {grown[i]:.6g} and the pressure gives "
-            f"{low[i]:.6g} to {high[i]:.6g}; the third value is the integral of the first"
-        )
+
+    def forget(self) -> None:
+        """Before a step: what went wrong in iterates of the last one is of no consequence."""
+        for watch in filter(None, (self.compliance, self.friction)):
+            watch.wrong = None
+
+    @property
+    def wrong(self) -> str | None:
+        """Why the step failed, if it was for one of the functions."""
+        return next((w.wrong for w in (self.compliance, self.friction) if w is not None and w.wrong), None)
 
 
-def _derives(name: str, law: Callable[..., Any], places: Array, *, axis: int) -> None:
+def _derives(law: Watch, places: Array, *, axis: int) -> None:
     """The derivative by an argument is the difference quotient, but at kinks."""
     step = np.zeros_like(places)
     step[:, axis] = 1e-5 * places[:, axis]
-    over, under, here = (_sampled(name, law, places + sign * step) for sign in (1, -1, 0))
+
+    def values(at: Array) -> Any:
+        return np.array([law.tried(*map(float, place)) for place in at]).T
+
+    over, under, here = (values(places + sign * step) for sign in (1, -1, 0))
     quotient, stated = (over[0] - under[0]) / (2 * step[:, axis]), here[1 + axis]
     size = np.maximum(np.abs(quotient), np.abs(stated))
     wrong = np.abs(quotient - stated) > NEAR * size + 1e-9 * np.abs(here[0]) / places[:, axis]
@@ -102,6 +193,6 @@ def _derives(name: str, law: Callable[..., Any], places: Array, *, axis: int) ->
         i = int(np.flatnonzero(wrong)[0])
         at = ", ".join(f"{x:.3g}" for x in places[i])
         raise ValueError(
-            f"{name}({at}): the derivative by argument {axis + 1} is given as {stated[i]:.6g}, a difference quotient says "
+            f"{law.name}({at}): the derivative by argument {axis + 1} is given as {stated[i]:.6g}, a difference quotient says "
             f"{quotient[i]:.6g}; correct the {('second', 'third')[axis]} value"
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from warmslip import _core, mesh_files
 from warmslip.expressions import Expression
-from warmslip.laws import Law
+from warmslip.laws import Watched
 from warmslip.loads import Array
 from warmslip.refinement import refined
 from warmslip.scene import Scene
@@ -104,10 +104,10 @@ def cell_regions(scene: Scene, mesh: Any) -> Any:
     return numbers
 
 
-def contact_part(contact: ContactTable, own: Law | None = None) -> Any:
+def contact_part(contact: ContactTable, own: Watched | None = None) -> Any:
     """A contact table as a `_core.ContactPart`, with functions of one's `own` in the place of its laws."""
     law, friction, exchange = None, contact.friction, contact.heat_exchange
-    own = own or Law()
+    own = own or Watched()
     if contact.stiffness is not None:
         compliance = _core.NormalCompliance(
             stiffness=contact.stiffness,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core
-from warmslip.laws import Law
+from warmslip.laws import Law, Watched
 from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
 from warmslip.materials import contact_part, make_mesh, materials, of_dim
 from warmslip.scene import FullScene, Scene
@@ -30,7 +30,7 @@ class Discretisation:
     surface: Any
     norms: Any
     load_vectors: LoadVectors
-    laws: dict[str, Law]
+    laws: list[Watched]  # functions in the place of the scene's laws
     own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
 
     @property
@@ -127,8 +127,9 @@ class Discretisation:
         return von_mises(self.stress(u, w, theta))
 
 
-def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Law]:
-    """The laws, each on a part that touches and tried on samples. Raises ValueError."""
+def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched]:
+    """The laws, each on a part that touches and tried on samples. Raises ValueError, TypeError for what is no Law."""
+    tried: dict[str, Watched] = {}
     touching = [contact.part for contact in scene.contacts if contact.stiffness is not None]
     for part, law in laws.items():
         if part not in touching:
@@ -137,11 +138,13 @@ def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Law]:
                 f"laws.{part}: no contact part with a stiffness is called so ({known}); the scene says what touches, even "
                 "where a law takes the place of its stiffness"
             )
-        law.check(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
+        if not isinstance(law, Law):
+            raise TypeError(f"laws['{part}'] is {law!r}; give a Law, such as Law(friction=...)")
+        tried[part] = law.tried(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
         log.warning(
             "laws.%s: evaluated in Python at every contact point and iteration, slower than the scene's own laws", part
         )
-    return laws
+    return tried
 
 
 def discretise(
@@ -161,13 +164,11 @@ def discretise(
 
     comm = MPI.COMM_WORLD if comm is None else comm
     d = scene.mesh.dim
-    own = [
-        *(["loads"] if loads is not None else []),
-        *(name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)),
-    ]
+    given_loads = loads is not None
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
-    laws = _checked(laws or {}, scene, mesh)
+    watched = _checked(laws or {}, scene, mesh)
+    own = ["loads"] * given_loads + [name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)]
     given, regions = materials(scene, mesh)
     problem = of_dim("Problem", d)(
         mesh=mesh,
@@ -175,7 +176,7 @@ def discretise(
         regions=regions,
         clamped=list(scene.supports.displacement),
         cooled=list(scene.supports.temperature),
-        contacts=[contact_part(contact, laws.get(contact.part)) for contact in scene.contacts],
+        contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
     )
     layout = of_dim("Layout", d)(comm, mesh)
     surface = of_dim("ContactSurface", d)(layout, problem)
@@ -196,7 +197,7 @@ def discretise(
         surface,
         of_dim("Norms", d)(layout),
         vectors,
-        laws,
+        list(watched.values()),
         own,
     )
 

@@ -116,14 +116,17 @@ class Run:
             except ValueError as error:  # a formula that gives no finite number; on every rank
                 self.outcome, self.failure = "data_not_finite", {"step": n, "reason": str(error)}
                 return
+            for law in self.discretisation.laws:
+                law.forget()
             report = self.stepper.advance(*loads)
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
             if report.outcome != _core.Outcome.right:
-                self.outcome = report.outcome.name
+                wrong = self._wrong_law()
+                self.outcome = "law_failed" if wrong else report.outcome.name
                 numbers = residuals(report) | {name: float(getattr(report.ledger, name)) for name in FLOORS}
                 known = {name: value for name, value in numbers.items() if value == value}  # nan: not computed
-                self.failure = {"step": n, "reason": report.reason} | known
+                self.failure = {"step": n, "reason": wrong or report.reason} | known
                 log.info("step %d was not taken: %s", n, self.outcome)
                 return
             self.report = report
@@ -135,6 +138,13 @@ class Run:
                 books = ", ".join(f"{name} {value:.1e}" for name, value in residuals(report).items())
                 log.debug("step %d: %d Newton iterations, %s", n, report.newton_iterations, books)
             yield State(self.discretisation, self.stepper, n), report
+
+    def _wrong_law(self) -> str | None:
+        """What a law of the user's did in the step, on the first rank that says so (collective)."""
+        if not self.discretisation.laws:
+            return None
+        said = self.comm.allgather(next((law.wrong for law in self.discretisation.laws if law.wrong), None))
+        return next(filter(None, said), None)
 
     def summary(self) -> dict[str, Any]:
         """What summary.json would hold now (collective)."""
@@ -161,8 +171,9 @@ def run(
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
-    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), identity_violated, precision_lost, solver_failed
-    (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or SIGTERM, which leave a checkpoint.
+    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), law_failed (a law of one's own), identity_violated,
+    precision_lost, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or
+    SIGTERM, which leave a checkpoint.
     Raises ValueError for a scene, loads or laws that make no sense, OSError when `out` cannot be written.
     """
     folder = Path(out) if out is not None else None

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "warmslip/contact_solver.hpp"
+#include "warmslip/contact_share.hpp"
 
 using namespace warmslip;
 
@@ -268,4 +268,72 @@ TEST_CASE_TEMPLATE("failure is said and never thrown", D, Two, Three) {
   body.problem.free[1] = NAN;
   CHECK_FALSE(ContactSolver<d>(body.compliance).solve(body.problem, guess).converged);
   CHECK_THROWS_AS(ContactSolver<d>(Eigen::MatrixXd::Identity(d, d + 1)), std::invalid_argument);
+}
+
+TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, whichever they had", D, Two, Three) {
+  constexpr int d = D::value;
+  constexpr int nodes = 5, points = 3 * (nodes - 1);  // a row of nodes, three points between two of them
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape(points, nodes), vector_shape(d * points, d * nodes);
+  for (int q = 0; q < points; ++q) {
+    const double at = 0.1 + 0.4 * (q % 3);
+    for (const auto& [node, value] : {std::pair{q / 3, 1 - at}, std::pair{q / 3 + 1, at}}) {
+      shape.insert(q, node) = value;
+      for (int a = 0; a < d; ++a) vector_shape.insert(q * d + a, node * d + a) = value;
+    }
+  }
+  int compared = 0, rested = 0, moved = 0, clipped = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const double friction = 0.05 + 0.1 * (seed % 8);
+    const Body<d> body = random_body<d>(seed, nodes, friction);
+    const Eigen::VectorXd push = Point<d>::Unit(d - 1).replicate(nodes, 1);  // mostly towards the foundation
+    ContactProblem<d> problem{
+        body.problem.laws, body.problem.step, {}, vector_shape * (0.5 * body.problem.free + 2 * push)};
+    Random random(seed + 1000);
+    for (int q = 0; q < points; ++q) {
+      const Point<d> normal = Point<d>::Unit(d - 1), u = 0.1 * random.template point<d>();
+      problem.points.push_back({normal, 0.3 + 0.2 * (q % 3), u.dot(normal) + 0.1, u, -0.1});
+    }
+    ContactOptions options;
+    options.proximal = 1e-8;
+    ContactSolver<d> solver(vector_shape * body.compliance * vector_shape.transpose(), options);
+    std::vector<ContactSolution<d>> found;
+    for (int guess = 0; guess < 3; ++guess) {
+      Eigen::VectorXd force(points * d);
+      for (double& entry : force) entry = 3 * guess * random();
+      found.push_back(solver.solve(problem, force));
+    }
+    if (!found[0].converged || !found[1].converged || !found[2].converged) continue;
+    const std::vector<ContactSolution<d>> before = found;
+    for (auto& one : found) CHECK(share_least(problem, shape, options.tolerance, one));
+    double floor;
+    const auto size = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+      double sum = 0;
+      for (int q = 0; q < points; ++q)
+        sum += a.template segment<d>(q * d).dot(b.template segment<d>(q * d)) /
+               problem.points[static_cast<std::size_t>(q)].weight;
+      return sum;
+    };
+    const Eigen::VectorXd& least = found[0].force;
+    for (int i = 0; i < 3; ++i) {
+      if ((found[i].velocity - found[0].velocity).norm() > 1e-9) continue;  // strong friction: another motion as well
+      ++compared;
+      CHECK((found[i].force - least).norm() <= 1e-7 * least.norm());
+      CHECK(found[i].status == found[0].status);
+      CHECK((vector_shape.transpose() * (found[i].force - before[i].force)).norm() <= 1e-11 * least.norm());
+      CHECK(law_residual(problem, found[i].force, found[i].velocity, &floor) <= 2e-12 + floor);
+      CHECK(size(least, before[i].force - least) >= -1e-9 * size(least, least));  // the nearest to zero of a convex set
+      moved += (before[i].force - least).norm() > 1e-3 * least.norm();
+    }
+    for (int q = 0; q < points; ++q) {
+      if (found[0].status[static_cast<std::size_t>(q)] != Status::stick) continue;
+      ++rested;
+      const Point<d> f = least.template segment<d>(q * d);
+      const double bound = friction * std::max(f[d - 1], 0.0);
+      clipped += std::sqrt(std::max(f.squaredNorm() - f[d - 1] * f[d - 1], 0.0)) > bound * (1 - 1e-9);
+    }
+  }
+  CHECK(compared > 250);
+  CHECK(rested > 50);
+  CHECK(moved > 10);
+  CHECK(clipped > 2);
 }

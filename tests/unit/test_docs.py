@@ -110,7 +110,7 @@ def test_every_term_of_the_ledger_is_explained() -> None:
 
 def test_every_outcome_is_explained() -> None:
     text = (DOCS / "messages.md").read_text()
-    for name in (*_core.Outcome.__members__, "data_not_finite", "interrupted"):
+    for name in (*_core.Outcome.__members__, "data_not_finite", "law_failed", "interrupted"):
         assert f"`{name}`" in text, name
 
 

@@ -23,6 +23,13 @@ CASES = {
         "contact.quadrature=gauss-2",
         "time.coupling=monolithic",
     ],
+    "sticking, Gauss points": [
+        "paper_mixed",
+        "mesh.n=8",
+        "time.steps=8",
+        "contact.quadrature=gauss-3",
+        "contact.friction.coefficient=0.6",
+    ],
     "block": ["block_3d", "mesh.n=3", "time.steps=4"],
 }
 

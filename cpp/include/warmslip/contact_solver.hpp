@@ -74,6 +74,7 @@ class ContactSolver {
   bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
 
   Eigen::MatrixXd compliance_;

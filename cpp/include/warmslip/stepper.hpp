@@ -51,8 +51,9 @@ struct StepReport {
 
 /// What a run costs, so far.
 struct Cost {
-  double setup_seconds = 0, step_seconds = 0;                          ///< CPU of this process
-  double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0;  ///< parts of step_seconds
+  double setup_seconds = 0, step_seconds = 0;  ///< CPU of this process
+  /// Parts of step_seconds: solves with their right-hand sides, the contact solver, the balances.
+  double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0, books_seconds = 0;
   int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0,
       newton_iterations = 0;
   double factor_bytes = 0;
@@ -95,7 +96,9 @@ class Stepper {
   bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
                      ContactSolution<d>& solution);
   void solve_heat(const StepLoads& loads, Vec heating_w);
+  Ledger balance(const StepInputs& inputs);
   Outcome judge(const Ledger& ledger) const;
+  std::string why(Outcome outcome, const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
   bool refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact);
   void split(Vec coupled, Vec w, Vec theta) const;

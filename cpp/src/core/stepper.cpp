@@ -8,11 +8,14 @@
 namespace warmslip {
 namespace {
 
+constexpr const char* beyond_doubles = "a number overflowed; scale the data";
+
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>
-StepReport<d> not_taken(Outcome outcome) {
+StepReport<d> not_taken(Outcome outcome, std::string reason) {
   StepReport<d> report;
   report.outcome = outcome;
+  report.reason = std::move(reason);
   Ledger& l = report.ledger;
   for (double* unknown : {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.law_floor,
                           &l.energy_floor, &l.force_floor})
@@ -101,6 +104,12 @@ bool Stepper<d>::refine(const StepLoads& loads, const StepInputs& inputs, Contac
   return true;
 }
 
+template <int d>
+Ledger Stepper<d>::balance(const StepInputs& inputs) {
+  const Timed timed(cost_.books_seconds);
+  return books_.close(now_, next_, inputs);
+}
+
 // Only a step that closes its books becomes the state.
 template <int d>
 Outcome Stepper<d>::judge(const Ledger& l) const {
@@ -113,14 +122,37 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
   return closed ? Outcome::right : Outcome::identity_violated;
 }
 
+// What a step that is not right is told of.
+template <int d>
+std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
+  const double bound = options_.identity_bound;
+  switch (outcome) {
+    case Outcome::not_finite:
+      return beyond_doubles;
+    case Outcome::precision_lost:
+      return l.law_floor <= options_.floor_bound
+                 ? "the body moves so far that rounding hides its strain; describe it from a frame that moves along"
+                 : "rounding hides the contact pressure; lower contact.stiffness or bring the body nearer";
+    case Outcome::identity_violated: {
+      std::string names;
+      for (const auto& [name, open] :
+           {std::pair{"energy", !(l.energy_residual <= bound + l.energy_floor)},
+            std::pair{"heat", !(l.heat_residual <= bound)}, std::pair{"force", !(l.force_residual <= bound)},
+            std::pair{"law", !(l.law_residual <= bound + l.law_floor)}})
+        if (open) names += (names.empty() ? "" : " and ") + std::string(name);
+      return names + " stays open: the linear solver is loose, or rounding takes the digits";
+    }
+    default:
+      return "";
+  }
+}
+
 template <int d>
 StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   try {
     return attempt(loads);
   } catch (const SolveFailed& failure) {  // on all ranks alike
-    StepReport<d> report = not_taken<d>(Outcome::solver_failed);
-    report.reason = failure.what();
-    return report;
+    return not_taken<d>(Outcome::solver_failed, failure.what());
   }
 }
 
@@ -149,7 +181,9 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     }
     const bool finite = layout_.sum(free_.allFinite() ? 0.0 : 1.0) == 0;
     if (contact_ && (!finite || !solve_contact(loads, free_, contact_force_, contact))) {
-      StepReport<d> report = not_taken<d>(finite ? Outcome::contact_not_converged : Outcome::not_finite);
+      StepReport<d> report = finite ? not_taken<d>(Outcome::contact_not_converged,
+                                                   "no stage of the contact solver reached the law; take smaller steps")
+                                    : not_taken<d>(Outcome::not_finite, beyond_doubles);
       report.stage = contact.stage;
       report.newton_iterations = contact.iterations;
       if (finite) report.ledger.law_residual = contact.law_residual;
@@ -161,12 +195,12 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     if (monolithic()) split(coupled_, next_.w, next_.theta);
   }
   const StepInputs inputs = complete(loads, contact);
-  Ledger ledger = books_.close(now_, next_, inputs);
+  Ledger ledger = balance(inputs);
   if (momentum_ &&
       std::max({ledger.energy_residual, ledger.force_residual, monolithic() ? ledger.heat_residual : 0.0}) >
           options_.refinement &&
       refine(loads, inputs, contact))
-    ledger = books_.close(now_, next_, complete(loads, contact));
+    ledger = balance(complete(loads, contact));
   StepReport<d> report = conclude(loads, ledger, contact);
   if (report.outcome == Outcome::right) cost_.substitutions += substitutions() - before;
   return report;
@@ -178,11 +212,7 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Ledger& ledger,
   StepReport<d> report;
   report.ledger = ledger;
   report.outcome = judge(ledger);
-  if (report.outcome == Outcome::precision_lost)
-    report.reason =
-        ledger.law_floor <= options_.floor_bound
-            ? "the body moves so far that rounding hides its strain; describe it from a frame that moves along"
-            : "rounding hides the contact pressure; lower contact.stiffness or bring the body nearer";
+  report.reason = why(report.outcome, ledger);
   if (report.outcome != Outcome::right) return report;
 
   report.stage = contact.stage;

@@ -41,7 +41,8 @@ Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Op
   }
   if (surface.points() > 0) {
     ContactOptions contact = options.contact;
-    // more contact points than nodes: sticking forces are shared arbitrarily, see ContactSolver::factor
+    // more contact points than nodes: sticking forces are shared in many ways, see ContactSolver::factor and
+    // share_least
     if (surface.points() > surface.nodes()) contact.proximal = 1e-8;
     try {
       contact_ = std::make_unique<ContactSolver<d>>(surface.at_points(momentum_->compliance()), contact);

@@ -1,5 +1,6 @@
 // The solves of a step: right-hand sides, contact forces, heat, and the way in and out of the coupled system.
 #include "timed.hpp"
+#include "warmslip/contact_share.hpp"
 #include "warmslip/stepper.hpp"
 
 namespace warmslip {
@@ -83,6 +84,8 @@ bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& fr
   const ContactProblem<d> problem =
       contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free, contact_->scale(free));
   solution = contact_->solve(problem, guess);
+  if (solution.converged && surface_.points() > surface_.nodes())
+    share_least(problem, surface_.scalar_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   int converged = solution.converged;

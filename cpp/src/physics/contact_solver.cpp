@@ -99,7 +99,8 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
     // rows in units of force, of order one in the force whatever the stiffness
     const double stiffness =
         law.compliance.scale(point.penetration + problem.step * problem.free.template segment<d>(row).dot(nu));
-    const double alpha = 1 / (1 + point.weight * stiffness * problem.step * normal);
+    // a law of the user's may be beyond doubles where no contact stops the body; any scale will do
+    const double alpha = std::isfinite(stiffness) ? 1 / (1 + point.weight * stiffness * problem.step * normal) : 1;
     // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more
     // often
     const double beta = 1 / std::max(reach_.template segment<d>(row).maxCoeff(), 1e-300);
@@ -191,6 +192,22 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
   return true;
 }
 
+// One Newton step more, where it does no harm. The law's tolerance lets a point that sticks creep along with its force,
+// and whoever asks which points are at rest would find it slipping.
+template <int d>
+void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  const Linearisation at = linearise(problem, solution.force);
+  factor(problem, at, solution);
+  ContactSolution<d> finer = solution;
+  finer.force += direction(at, solution.force);
+  const Linearisation there = linearise(problem, finer.force);
+  finer.velocity = there.velocity;
+  if (!accept(problem, finer) || finer.law_residual > solution.law_residual) return;
+  for (std::size_t i = 0; i < there.points.size(); ++i) finer.status[i] = there.points[i].status;
+  ++finer.iterations;
+  solution = std::move(finer);
+}
+
 // Thresholds frozen, the step is convex: minimise 1/2 l.C l - l.free plus the law's conjugate by accelerated proximal
 // gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
 template <int d>
@@ -244,6 +261,7 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
       inertia = 1;
     }
     const Eigen::VectorXd next = prox(momentum + rate * (problem.free - compliance_ * momentum), bounds);
+    if (!next.allFinite()) return false;
     const double stronger = (1 + std::sqrt(1 + 4 * inertia * inertia)) / 2;
     momentum = next + (inertia - 1) / stronger * (next - force);
     force = next;
@@ -314,6 +332,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   attempt(Stage::line_search, [&] { return newton(problem, true, solution); });
   attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
+  if (solution.converged && options_.proximal > 0) polish(problem, solution);
   return solution;
 }
 
