@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
+from warmslip.loads import Array
 from warmslip.runner import Run
 from warmslip.scene import Scene, load
 
@@ -29,7 +31,7 @@ HEATS: dict[str, tuple[str, ...]] = {
     "both": (),
 }
 EXCHANGES = {"insulated": ("contact.heat_exchange",), "exchange": ()}
-CHUNK = 5  # steps of one run before the other one goes on, so that both see the same machine
+TURN = 5  # steps before the whole model goes on
 
 
 def whole(n: int, steps: int) -> Scene:
@@ -109,69 +111,89 @@ class Floor:
 
 
 class March:
-    """A run step by step, with what each of its steps and of its stages took. RuntimeError when a step is not right."""
-
-    STAGES = ("momentum", "contact", "heat")
+    """A run step by step, with the seconds of its contact solver and its balances. RuntimeError when a step is not right."""
 
     def __init__(self, job: Run) -> None:
         self._job, self._steps = job, job.steps()
-        self._stages: dict[str, list[float]] = {name: [] for name in self.STAGES}
+        self.contact: list[float] = []
+        self.books: list[float] = []
 
     def step(self) -> None:
         cost = self._job.stepper.cost
-        before = {name: getattr(cost, f"{name}_seconds") for name in self.STAGES}
+        contact, books = cost.contact_seconds, cost.books_seconds
         if next(self._steps, None) is None:
             raise RuntimeError(f"the run ended: {self._job.outcome}, {self._job.failure}")
-        for name, found in self._stages.items():
-            found.append(getattr(self._job.stepper.cost, f"{name}_seconds") - before[name])
-
-    def stage(self, name: str) -> float:
-        """Median seconds of a stage."""
-        return float(np.median(self._stages[name]))
+        self.contact.append(cost.contact_seconds - contact)
+        self.books.append(cost.books_seconds - books)
 
 
-def interleaved(actions: list[Callable[[], None]], steps: int) -> list[float]:
-    """Median seconds of every action, called `steps` times each, in turns."""
-    times: list[list[float]] = [[] for _ in actions]
-    for _ in range(steps // CHUNK):
-        for action, found in zip(actions, times, strict=True):
-            for _ in range(CHUNK):
-                begin = time.perf_counter()
-                action()
-                found.append(time.perf_counter() - begin)
-    return [float(np.median(found)) for found in times]
+def timed(action: Callable[[], None]) -> float:
+    """CPU seconds of a call: what other processes take of the wall time does not count."""
+    begin = time.process_time()
+    action()
+    return time.process_time() - begin
+
+
+def settled(seconds: list[float]) -> Array:
+    """Without the first turn, and the first step of every other one: the whole model has just been through the caches."""
+    return np.reshape(seconds, (-1, TURN))[1:, 1:].ravel()
+
+
+def spread(name: str, ratio: Array) -> dict[str, float]:
+    """Median and quartiles of a ratio taken in every step."""
+    return {
+        f"{name}{end}": float(np.quantile(ratio, at)) for end, at in (("", 0.5), ("_lower", 0.25), ("_upper", 0.75))
+    }
 
 
 def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
-    """One line of the table, every time in seconds a step of one process.
+    """One line of the table; seconds are medians a step, CPU of one process, ratios those of calls after each other.
 
-    `floor` is the least code for what is linear plus what the contact solver took. `absent` is what the step takes beside its
-    contact solver, whose iterations depend on the physics, over the same of the whole model less the solves of absent
-    fields, nan where nothing moves: above 1, what is absent costs something. It bounds from above alone, as products
-    and balances of absent fields stay in the whole model; that absent blocks are not solved for is counted, not timed.
+    `least` is the least code for what is linear, written for the blocks that are there and no others. `over_least` is a step
+    without its contact solver and its balances over it: 1 when what is absent costs nothing. `over_floor` is the whole step,
+    balances included, over the least code and the contact solver. `_lower` and `_upper` are quartiles. `substitutions`,
+    `products` (of a matrix and a vector) and `newton_iterations` are counted, a step each.
     """
+    product = PETSc.Log.Event("MatMult")
     job, model = Run(scene(full, chosen)), Run(full)
     one, whole_model, floor = March(job), March(model), Floor(job)
-    step, whole_step, least = interleaved([one.step, whole_model.step, floor.step], full.time.steps)
-    fields = {"momentum": chosen["motion"] != "none", "heat": chosen["heat"] != "none"}
-    gone = sum(whole_model.stage(name) for name, there in fields.items() if not there)
-    contact, cost = one.stage("contact"), job.stepper.cost
-    kept = whole_step - whole_model.stage("contact") - gone
-    return chosen | {
-        "bricks": full.mesh.counts[0],
-        "unknowns": job.discretisation.unknowns,
-        "step": step,
-        "whole_model": whole_step,
-        "over_whole_model": step / whole_step,
-        "contact_solver": contact,
-        "floor": least + contact,
-        "over_floor": step / (least + contact),
-        "absent": (step - contact) / kept if fields["momentum"] else float("nan"),
-        "substitutions": cost.substitutions / cost.steps,
-        "newton_iterations": cost.newton_iterations / cost.steps,
-        "factorizations": cost.factorizations,
-        "refinements": cost.refinements,
-    }
+    times: dict[str, list[float]] = {"step": [], "least": [], "whole": []}
+    products = 0
+    for n in range(full.time.steps):
+        before = product.getPerfInfo()["count"]
+        times["step"].append(timed(one.step))
+        products += product.getPerfInfo()["count"] - before
+        times["least"].append(timed(floor.step))
+        if n % TURN == TURN - 1:  # both see the same machine
+            times["whole"] += [timed(whole_model.step) for _ in range(TURN)]
+    steps, least, whole_steps, contact, books = (
+        settled(seconds) for seconds in (times["step"], times["least"], times["whole"], one.contact, one.books)
+    )
+    cost = job.stepper.cost
+    return (
+        chosen
+        | {"bricks": full.mesh.counts[0], "unknowns": job.discretisation.unknowns}
+        | {
+            name: float(np.median(seconds))
+            for name, seconds in (
+                ("step", steps),
+                ("whole_model", whole_steps),
+                ("contact_solver", contact),
+                ("balances", books),
+                ("least", least),
+            )
+        }
+        | spread("over_whole_model", steps / whole_steps)
+        | spread("over_least", (steps - contact - books) / least)
+        | spread("over_floor", steps / (least + contact))
+        | {
+            "substitutions": cost.substitutions / cost.steps,
+            "products": products / cost.steps,
+            "newton_iterations": cost.newton_iterations / cost.steps,
+            "factorizations": cost.factorizations,
+            "refinements": cost.refinements,
+        }
+    )
 
 
 def table(n: int, steps: int, progress: Callable[[int, int], None] | None = None) -> list[dict[str, Any]]:
@@ -179,12 +201,11 @@ def table(n: int, steps: int, progress: Callable[[int, int], None] | None = None
 
     Raises ValueError for a number of steps that is no multiple of 5, and on several ranks.
     """
-    if steps % CHUNK or steps < 2 * CHUNK:
-        raise ValueError(
-            f"steps = {steps} is no multiple of {CHUNK}, or less than two of them; give {2 * CHUNK} or more"
-        )
+    if steps % TURN or steps < 2 * TURN:
+        raise ValueError(f"steps = {steps} is no multiple of {TURN}, or less than two of them; give {2 * TURN} or more")
     if MPI.COMM_WORLD.size > 1:
         raise ValueError("the cost of blocks is measured on one process; start it without mpirun")
+    PETSc.Log.begin()  # counts products of matrices
     full, chosen = whole(n, steps), list(combinations())
     rows = []
     for i, one in enumerate(chosen, start=1):

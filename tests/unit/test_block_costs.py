@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
+from petsc4py import PETSc
 
 from warmslip import blocks, estimate
 from warmslip.runner import Run
@@ -22,9 +23,33 @@ def test_all_that_make_sense_once() -> None:
     assert blocks.scene(FULL, whole) == FULL
 
 
+OPERATORS = ("inertia", "elasticity", "viscosity", "mass", "conductivity", "expansion", "heating", "exchange")
+
+
+def expected(chosen: dict[str, str]) -> list[str]:
+    """The operators that a choice has, from its words."""
+    motion, heat = chosen["motion"], chosen["heat"]
+    return [
+        *["inertia"] * (motion in ("elastic", "viscoelastic")),
+        *["elasticity"] * (motion != "none"),
+        *["viscosity"] * motion.startswith("viscoelastic"),
+        *["mass", "conductivity"] * (heat != "none"),
+        *["expansion"] * (heat in ("expands", "both")),
+        *["heating"] * (heat in ("heated", "both")),
+        *["exchange"] * (chosen["exchange"] == "exchange"),
+    ]
+
+
 @pytest.mark.parametrize("chosen", ALL, ids=["; ".join(one.values()) for one in ALL])
 def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
+    PETSc.Log.begin()
+    product, counted = PETSc.Log.Event("MatMult"), Run(blocks.scene(FULL, chosen))
+    before = product.getPerfInfo()["count"]
+    assert sum(1 for _ in counted.steps()) == 10
+    products = product.getPerfInfo()["count"] - before
     job = Run(blocks.scene(FULL, chosen))
+    there = [name for name in OPERATORS if getattr(job.discretisation.operators, name) is not None]
+    assert products == 10 * len(there) and there == sorted(expected(chosen), key=OPERATORS.index)
     floor = blocks.Floor(job)
     for _ in job.steps():
         floor.step()
@@ -49,7 +74,12 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
     (row,) = estimate.table(repeats=1)
     assert row["scene"] == "heat_slab" and row["said"] > 0 and row["took"] > 0
     monkeypatch.setattr(blocks, "combinations", lambda: iter(ALL[-2:]))
-    rows = blocks.table(4, 10)
-    assert all(r["over_floor"] > 0 and r["absent"] > 0 and r["unknowns"] == 75 for r in rows)
+    for row in blocks.table(4, 20):
+        assert (row["unknowns"], row["substitutions"], row["refinements"]) == (75, 2, 0)
+        assert row["products"] == len(expected(row))
+        assert 0 < row["least"] < row["step"] < 10 * row["whole_model"]
+        assert row["contact_solver"] > 0 and row["balances"] > 0
+        for name in ("over_whole_model", "over_least", "over_floor"):
+            assert 0 < row[f"{name}_lower"] <= row[name] <= row[f"{name}_upper"]
     wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
     assert wrong.returncode == 2 and "no multiple of 5" in wrong.stderr
