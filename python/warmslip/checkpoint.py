@@ -6,6 +6,7 @@ killed leaves at least one whole. What a checkpoint belongs to (scene, mesh, cod
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -24,20 +25,43 @@ if TYPE_CHECKING:
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
 STATUSES = (0, 1, 2)  # open, stick, slip
+# where laws of the user's are asked, to be told from others: penetration; pressure and slip speed
+LENGTHS = [(1e-6,), (1e-4,), (1e-2,)]
+PRESSURES = [(1e-3, 0.1), (1.0, 1e-3), (1.0, 1.0), (1e3, 0.1)]
 
 
 _fingerprint = cache(provenance.fingerprint)  # it reads every source, and this process has one code
 
 
 def _owner(job: Run) -> dict[str, Any]:
-    """What must be the same for the same next step."""
+    """What must be the same for the same next step (collective)."""
     return {
         "scene": job.scene.digest(),
         "code": _fingerprint(),
         "solver": job.stepper.solver,
         "ranks": job.comm.size,
-        "functions": job.discretisation.own,  # their names; what they compute nobody can compare
+        "set of Python functions": [*job.discretisation.own, *_values(job)],
     }
+
+
+def _values(job: Run) -> list[str]:
+    """A hash of what Python functions in the place of the scene's give at two times and some places, if there are any."""
+    if not job.discretisation.own:
+        return []
+    found = hashlib.sha256()
+    for time in (job.scene.step, job.scene.time.end):
+        try:
+            given = job.discretisation.load_vectors.at(time, job.scene.step)
+        except ValueError as error:  # on every rank
+            found.update(str(error).encode())
+            continue
+        for one in given:
+            found.update(np.asarray(getattr(one, "array", one if one is not None else ())).tobytes())
+    for law in job.discretisation.laws:
+        for watch, places in ((law.compliance, LENGTHS), (law.friction, PRESSURES)):
+            if watch is not None:
+                found.update(np.array([watch(*place) for place in places]).tobytes())
+    return ["".join(job.comm.allgather(found.hexdigest()))]
 
 
 def save(folder: Path, job: Run) -> None:
@@ -45,10 +69,11 @@ def save(folder: Path, job: Run) -> None:
     stepper = job.stepper
     stepper.forget()
     fields = {name: job.discretisation.field(getattr(stepper, name)) for name in FIELDS}
+    owner = _owner(job)
     if job.comm.rank != 0:
         return
     record = {
-        "owner": _owner(job),
+        "owner": owner,
         "step": job.taken,
         "time": float(stepper.time).hex(),
         "worst": job.worst,
@@ -135,13 +160,13 @@ def load(folder: Path, job: Run) -> int:
     Collective. Raises ValueError when the only whole checkpoints belong to another scene, code or number of ranks.
     """
     found: tuple[dict[str, Any], dict[str, Any]] | None = None
-    foreign = ""
+    foreign, owner = "", _owner(job)
     if job.comm.rank == 0:
         for name in NAMES:
             whole = _read(folder / name)
             if whole is None:
                 continue
-            other = [key for key, value in _owner(job).items() if whole[0]["owner"].get(key) != value]
+            other = [key for key, value in owner.items() if whole[0]["owner"].get(key) != value]
             if not other:
                 if not _fits(*whole, job):
                     continue

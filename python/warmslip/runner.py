@@ -166,8 +166,8 @@ def run(
     """Runs a scene. With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs.
 
     With `resume`, goes on from the newest whole checkpoint in `out`, to the same end bit by bit as the run that was not
-    stopped; without one it starts from the beginning. Functions in Python must be there again;
-    what they compute is not compared.
+    stopped; without one it starts from the beginning. Functions in Python must be there again; they are told apart by
+    what they give at two times and a few places.
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of

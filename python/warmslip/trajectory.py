@@ -240,11 +240,27 @@ class Trajectory:
         try:
             self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
             _check(self._file)
+            self._steps, self._states = self._whole()
         except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
             self._file.close()
             raise ValueError(
                 f"'{path}' is damaged or no trajectory ({error}); give the trajectory.h5 that `warmslip run` wrote"
             ) from None
+
+    def _whole(self) -> tuple[int, int]:
+        """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
+        file = self._file
+        series = [data for group in ("steps", "ledger") for data in file[group].values()]
+        series += [file[f"contact/{name}"] for name in CONTACT if name in file["contact"]]
+        steps = min(len(data) for data in series)
+        states = min(len(data) for data in file["states"].values())
+        last = file["steps/time"][steps - 1] if steps else 0.0
+        return steps, int(np.sum(np.asarray(file["states/time"][:states]) <= last * (1 + 1e-12)))
+
+    def _state(self, name: str) -> Any:
+        """A field of the whole states: the dataset itself if it has no others."""
+        data = self._file.get(f"states/{name}")
+        return data if data is None or len(data) == self._states else data[: self._states]
 
     @property
     def nodes(self) -> Array:
@@ -259,26 +275,28 @@ class Trajectory:
     @property
     def time(self) -> Array:
         """Times of the stored states, (states,)."""
-        return np.asarray(self._file["states/time"])
+        return np.asarray(self._state("time"))
 
     @property
     def u(self) -> Any:
         """Displacement, (states, nodes, d), read when indexed."""
-        return self._file.get("states/u")
+        return self._state("u")
 
     @property
     def w(self) -> Any:
         """Velocity, (states, nodes, d)."""
-        return self._file.get("states/w")
+        return self._state("w")
 
     @property
     def theta(self) -> Any:
         """Temperature, (states, nodes)."""
-        return self._file.get("states/theta")
+        return self._state("theta")
 
     def contact(self, name: str, step: int) -> Any:
-        """`force`, `displacement`, `status` or `gap` of the contact points in a step, counted from 0."""
-        return self._file[f"contact/{name}"][step]
+        """`force`, `displacement`, `status` or `gap` of the contact points in a step, counted from 0. Raises IndexError."""
+        if not -self._steps <= step < self._steps:
+            raise IndexError(f"there are {self._steps} steps, and none with the number {step}")
+        return self._file[f"contact/{name}"][step % self._steps]
 
     def discretisation(self) -> Discretisation:
         """The scene assembled again on this process, with the loads and laws that it states.
@@ -304,7 +322,10 @@ class Trajectory:
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""
-        return {name: np.asarray(data) for name, data in self._file[group].items()}
+        fixed = () if group in ("steps", "ledger") else ("positions", "normals", "weights", "part")
+        return {
+            name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._file[group].items()
+        }
 
     def xarray(self) -> Any:
         """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import pytest
 from conftest import Command, child_environment
 
 import warmslip
-from warmslip import Scene, checkpoint, load
+from warmslip import Scene, checkpoint, export, load
 from warmslip.runner import Run
 
 KEYS = ["mesh.n=8", "time.steps=24", "output.every=7", "output.checkpoint=5"]
@@ -110,6 +111,37 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
 LONG = ["mesh.n=32", "time.steps=1200", "output.every=50", "output.checkpoint=40"]
 
 
+@pytest.mark.parametrize("shorter", ["steps/slip", "ledger/friction", "contact/status", "states/theta"])
+def test_a_series_that_lacks_its_last_row_cuts_the_others(tmp_path: Path, shorter: str) -> None:
+    warmslip.run(scene("output.every=1"), out=tmp_path)
+    path = tmp_path / "trajectory.h5"
+    with warmslip.Trajectory(path) as t:
+        whole = t.series("contact")["force"], t.u[:]
+    with h5py.File(path, "r+") as file:
+        file[shorter].resize(len(file[shorter]) - 1, axis=0)
+    readable(path)
+    with warmslip.Trajectory(path) as t:
+        steps = 24 - (not shorter.startswith("states"))
+        assert np.array_equal(t.series("contact")["force"], whole[0][:steps])
+        assert np.array_equal(t.u, whole[1][:24]) and len(t.series("contact")["weights"]) == 9
+        assert np.array_equal(t.contact("force", -1), whole[0][steps - 1])
+        with pytest.raises(IndexError, match=f"there are {steps} steps"):
+            t.contact("force", steps)
+    assert export.export(tmp_path, tmp_path / "series") == 24
+
+
+def readable(path: Path) -> None:
+    """What a killed run left is whole to its last second: as many steps in every series, and states of those."""
+    with warmslip.Trajectory(path) as t:
+        lengths = {len(values) for group in ("steps", "ledger") for values in t.series(group).values()}
+        lengths |= {len(t.series("contact")[name]) for name in ("force", "displacement", "status", "gap")}
+        assert len(lengths) == 1
+        assert len(t.time) == len(t.u) == len(t.w) == len(t.theta) >= 1
+        (steps,) = lengths
+        step = t.scene["time"]["end"] / t.scene["time"]["steps"]
+        assert round(float(t.time[-1]) / step) <= steps and np.isfinite(t.u[-1]).all()
+
+
 def killed(folder: Path, after: float | None) -> bool:
     """Starts or goes on with a run and kills it `after` seconds beyond its first checkpoint; whether it ended by itself."""
     words = [word for key in LONG for word in ("--set", key)]
@@ -124,11 +156,14 @@ def killed(folder: Path, after: float | None) -> bool:
     )
     while after is not None and process.poll() is None:
         if newest.exists() and newest.stat().st_mtime_ns > begin:  # so that every process brings the run on
+            readable(folder / "trajectory.h5")  # while it is being written
             time.sleep(after)
             process.send_signal(signal.SIGKILL)
             break
         time.sleep(0.002)
     _, errors = process.communicate(timeout=600)
+    if process.returncode:
+        readable(folder / "trajectory.h5")
     assert process.returncode in (0, -signal.SIGKILL), errors.decode()
     return process.returncode == 0
 
@@ -222,9 +257,26 @@ def test_a_run_with_functions_is_not_resumed_without_them(tmp_path: Path) -> Non
     law = {"bottom": warmslip.Law(friction=lambda p, s: (0.1 * p, 0.1, 0.0))}
     with pytest.raises(KilledError):
         warmslip.run(scene(), out=tmp_path, laws=law, progress=stop_after(7))
-    with pytest.raises(ValueError, match="is of another functions"):
+    with pytest.raises(ValueError, match="is of another set of Python functions"):
         warmslip.run(scene(), out=tmp_path, resume=True)
+    other = {"bottom": warmslip.Law(friction=lambda p, s: (0.1001 * p, 0.1001, 0.0))}
+    with pytest.raises(ValueError, match="is of another set of Python functions"):
+        warmslip.run(scene(), out=tmp_path, laws=other, resume=True)
     assert warmslip.run(scene(), out=tmp_path, laws=law, resume=True).summary["steps"] == 24
+
+
+def test_a_run_with_loads_is_not_resumed_with_others(tmp_path: Path) -> None:
+    def loads(late: float) -> warmslip.Loads:
+        def body(x: Any, t: Any) -> Any:
+            return np.full(x.shape, -1.0) * (t + late * (t > scene().time.end * 0.99))
+
+        return replace(warmslip.Loads.of(scene()), body=body)
+
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, loads=loads(0.0), progress=stop_after(7))
+    with pytest.raises(ValueError, match="is of another set of Python functions"):
+        warmslip.run(scene(), out=tmp_path, loads=loads(0.1), resume=True)
+    assert warmslip.run(scene(), out=tmp_path, loads=loads(0.0), resume=True).summary["steps"] == 24
 
 
 def test_the_end_of_another_scene_is_not_overwritten(tmp_path: Path) -> None:
