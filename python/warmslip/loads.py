@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from warmslip import _core
 from warmslip.expressions import Expression, constant
+from warmslip.expressions import told as shown
 from warmslip.scene import Scene
 
 Array = NDArray[np.float64]
 # what supports hold, and its components (None: as many as axes)
 SUPPORTS: dict[str, int | None] = {"displacement": None, "temperature": 1}
 HEATED = "contact.heat_exchange.foundation_temperature"
+ON_CONTACT = {"gap": "contact.gap", "foundation_temperature": HEATED}
 # constants, or functions of positions (points, d) and time returning (points,) or (points, d)
 Data = Any
 
@@ -99,20 +101,44 @@ class Loads:
 
 
 def evaluate(data: Data, x: Array, t: float, components: int, what: str = "a load") -> Array:
-    """Values of `data` at positions x (points, d), as (points, components). Raises ValueError when not finite or misshaped.
+    """Values of `data` at positions x (points, d), as (points, components).
 
-    `what` is what the message calls it.
+    Raises ValueError when they are no numbers, not finite or misshaped, and for whatever a function in Python raises. `what` is
+    what the message calls it.
     """
-    value = np.asarray(data(x, t) if callable(data) else data, dtype=float)
+    value = shaped(data, x, t, components, what)
+    if not np.isfinite(value).all():
+        raise ValueError(f"{what} is not finite at t = {t:g}; check its expression")
+    return np.ascontiguousarray(value)
+
+
+def shaped(data: Data, x: Array, t: float, components: int, what: str) -> Array:
+    """As `evaluate`, of numbers that need not be finite."""
+    value = _numbers(data, x, t, what)
     if value.ndim < 2 and components == 1 and value.shape in ((), (len(x),)):
         value = np.broadcast_to(value, (len(x),))[:, None]
     elif value.shape in ((), (components,)):
         value = np.broadcast_to(value, (len(x), components))
     if value.shape != (len(x), components):
         raise ValueError(f"{what} must give shape {(len(x), components)} at {len(x)} points, got {value.shape}")
-    if not np.isfinite(value).all():
-        raise ValueError(f"{what} is not finite at t = {t:g}; check its expression")
-    return np.ascontiguousarray(value)
+    return value
+
+
+def _numbers(data: Data, x: Array, t: float, what: str) -> Array:
+    """As `evaluate`, of any shape."""
+    given = data
+    if callable(data):
+        try:
+            given = data(x, t)
+        except Exception as error:  # somebody else's code: without a name nobody finds it among ten loads
+            why = str(error) if isinstance(data, Formula) else f"the function raised {error!r}; correct it"
+            raise ValueError(f"{what} at t = {t:g}: {why}") from error
+        if given is None:
+            raise ValueError(f"{what} at t = {t:g}: the function gave None; let it return its values")
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} at t = {t:g}: {shown(given)} is no array of numbers; give one") from None
 
 
 @dataclass(frozen=True)
@@ -186,20 +212,34 @@ class LoadVectors:
         self._points = {i: np.flatnonzero(np.asarray(surface.contacts, int) == i) for i in touching}
         self._reactive = conducts and any(c.heats for c in scene.contacts)
         self._kept: dict[str, Array] = {}
+        self._try(scene.step)
+
+    def _try(self, t: float) -> None:
+        """Calls the functions in Python of the first step: one that is wrong is refused here, and not the outcome of a run."""
+        for mechanical, rule, data, what in self._moving:
+            if not isinstance(data, Formula):
+                self._together(data, rule.positions, t, self._dim if mechanical else 1, what, shaped)
+        for i, points in self._points.items() if self._reactive else ():
+            data = self._loads.on_contact("foundation_temperature", i)
+            if callable(data) and not isinstance(data, Formula):
+                self._together(data, np.asarray(self._surface.positions)[points], t, 1, HEATED, shaped)
 
     def _add(self, pair: tuple[Any, Any], mechanical: bool, rule: Any, data: Data, t: float, what: str) -> None:
         vector = rule.load(self._together(data, rule.positions, t, self._dim if mechanical else 1, what))
         (pair[0] if mechanical else pair[1]).axpy(1.0, vector)
         vector.destroy()  # petsc4py would only mark it for a later collection
 
-    def _together(self, data: Data, x: Array, t: float, components: int, what: str) -> Array:
-        """`evaluate` on every rank's own places; when it fails on one, all raise ValueError and none waits for the others."""
+    def _together(
+        self, data: Data, x: Array, t: float, components: int, what: str, read: Callable[..., Array] = evaluate
+    ) -> Array:
+        """`read` on every rank's own places; when it fails on one, all raise ValueError and none waits for the others."""
         if self._comm.size == 1:
-            return evaluate(data, x, t, components, what)
+            return read(data, x, t, components, what)
         values, error = np.empty((0, components)), ""
         try:
-            values = evaluate(data, x, t, components, what)
+            values = read(data, x, t, components, what)
         except Exception as own:
+            # kept as words: what its trace holds would be destroyed later on this rank than on the others, which then wait
             error = str(own) or repr(own)
         errors = [other for other in self._comm.allgather(error) if other]
         if errors:
@@ -214,7 +254,7 @@ class LoadVectors:
         out, moving = np.zeros(len(x)), False
         for i, points in self._points.items():
             value = self._loads.on_contact(name, i)
-            out[points] = self._together(value, x[points], t, 1, f"contact.{name}")[:, 0]
+            out[points] = self._together(value, x[points], t, 1, ON_CONTACT[name])[:, 0]
             moving = moving or of_time(value)
         if not moving:
             self._kept[name] = out
@@ -276,8 +316,9 @@ def _times(factor: float, data: Data) -> Data:
     if factor == 0:
         return 0.0
 
-    def product(x: Array, t: float) -> Array:
-        return np.asarray(factor * np.asarray(data(x, t)))
+    def product(x: Array, t: float) -> Array | None:
+        value = data(x, t)
+        return None if value is None else np.asarray(factor * np.asarray(value))
 
     product.of_time = of_time(data)  # type: ignore[attr-defined]
     return product

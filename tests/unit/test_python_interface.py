@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -239,3 +241,63 @@ def test_a_law_is_that_of_its_part_alone() -> None:
     scene = scene.override(contact=parts, **held)
     told, own = warmslip.run(scene), warmslip.run(scene, laws={"left": Law(compliance=linear)})
     assert np.abs(own.u - told.u).max() < 1e-13 and np.abs(told.u).max() > 1e-2
+
+
+def wrong(x: np.ndarray, t: float) -> Any:
+    raise KeyError("force")
+
+
+def late(x: np.ndarray, t: float) -> Any:
+    return 1 / (t - 0.5) if t < 0.6 else {}["force"]
+
+
+FUNCTIONS = {
+    "loads.body": {"body": wrong},
+    "heat.source": {"source": wrong},
+    "loads.traction.left": {"traction": {"left": wrong}},
+    "loads.heat_flux.bottom": {"heat_flux": {"bottom": wrong}},
+    "supports.displacement.top": {"displacement": {"top": wrong}},
+    "supports.temperature.top": {"temperature": {"top": wrong}},
+    "contact_traction": {"contact_traction": wrong},
+    "contact_flux": {"contact_flux": wrong},
+    "contact.gap": {"gap": wrong},
+    "contact.heat_exchange.foundation_temperature": {"foundation_temperature": wrong},
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_load_that_raises_is_named_with_its_time(small: Small, name: str) -> None:
+    scene = small()
+    with pytest.raises(ValueError, match=r"the function raised KeyError\('force'\); correct it") as refused:
+        warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), **FUNCTIONS[name]))
+    assert str(refused.value).startswith(f"{name} at t = ") and "\n" not in str(refused.value)
+    assert isinstance(refused.value.__cause__, KeyError)
+
+
+@pytest.mark.parametrize("per_pressure", [0.0, 1.0])
+def test_a_foundation_temperature_is_named_however_it_acts(small: Small, per_pressure: float) -> None:
+    scene = small(contact__heat_exchange__conductance=1.0 - per_pressure)
+    scene = scene.override(**{"contact.heat_exchange.per_pressure": per_pressure})
+    with pytest.raises(ValueError, match=r"foundation_temperature at t = 0.25: the function raised KeyError"):
+        warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), foundation_temperature=wrong))
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [
+        (lambda x, t: None, "loads.body at t = 0.25: the function gave None"),
+        (lambda x, t: ["much", "more"], "loads.body at t = 0.25: ['much', 'more'] is no array of numbers"),
+        (lambda x, t: np.zeros(3), "loads.body must give shape"),
+    ],
+)
+def test_a_load_that_gives_no_numbers_is_named(small: Small, load: Any, words: str) -> None:
+    scene = small()
+    with pytest.raises(ValueError, match=re.escape(words)):
+        warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), body=load))
+
+
+def test_a_load_that_raises_later_ends_the_run_with_its_name(small: Small) -> None:
+    scene = small(time__steps=5)
+    done = warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), source=late))
+    assert (done.outcome, done.summary["steps"]) == ("data_not_finite", 2)
+    assert done.summary["failure"]["reason"].startswith("heat.source at t = 0.6: the function raised KeyError('force')")
