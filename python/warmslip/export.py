@@ -66,6 +66,9 @@ def export(
     contact part, and the ledger of every step. Raises ValueError for what is no run, an unknown field or a time beyond the run,
     OSError when it cannot be written.
     """
+    if isinstance(fields, str) or isinstance(times, str | float | int):
+        name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
+        raise TypeError(f"{name}: {given!r} is no list; write [{given!r}]")
     for name in fields:
         if name not in FIELDS:
             near = difflib.get_close_matches(name, FIELDS, 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 import warnings
+from types import FunctionType
 from typing import Annotated, Any
 
 import numpy as np
@@ -153,6 +154,8 @@ def finite(value: float) -> bool:
 
 def told(value: Any) -> str:
     """A value as a message repeats it, of a long one the beginning."""
+    if isinstance(value, FunctionType):  # whose address tells nothing
+        return f"the function {value.__name__}"
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits, a table in a table in a ...

@@ -73,6 +73,12 @@ class Loads:
     foundation_temperature: Data | list[Data] = 0.0
     points: int = 3
 
+    def __post_init__(self) -> None:
+        """Raises TypeError for a load that is not by part where it should be."""
+        for name in ("traction", "heat_flux", "displacement", "temperature"):
+            if not isinstance(value := getattr(self, name), dict):
+                raise TypeError(f"loads.{name}: {shown(value)} is no dictionary; give it by part, {{'left': ...}}")
+
     @classmethod
     def of(cls, scene: Scene) -> Loads:
         """The loads that a scene states."""
@@ -141,6 +147,24 @@ def _numbers(data: Data, x: Array, t: float, what: str) -> Array:
         raise ValueError(f"{what} at t = {t:g}: {shown(given)} is no array of numbers; give one") from None
 
 
+def _refuse_unused(scene: Scene, loads: Loads) -> None:
+    """Raises ValueError for data that no support or contact part of the scene would take."""
+    for name in SUPPORTS:
+        held = getattr(scene.supports, name)
+        for part in getattr(loads, name):
+            if part not in held:
+                known = ", ".join(held) or "none is"
+                raise ValueError(
+                    f"loads.{name}: '{part}' is not held ({known}); name it in the scene's supports.{name} too"
+                )
+    for name in ON_CONTACT:
+        values = getattr(loads, name)
+        if isinstance(values, list) and len(values) != len(scene.contacts):
+            raise ValueError(
+                f"loads.{name}: a list of {len(values)}; give one for each of {len(scene.contacts)} contact parts"
+            )
+
+
 @dataclass(frozen=True)
 class StepData:
     """What one step is given: load vectors (f, v) and (q, eta), the gap (points), velocity and temperature of the supports
@@ -162,6 +186,7 @@ class LoadVectors:
 
     def __init__(self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any) -> None:
         dim = scene.mesh.dim
+        _refuse_unused(scene, loads)
         self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
         self._nodes, self._layout, self._step = np.asarray(mesh.nodes), layout, scene.step
         self._held = {

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from warmslip import _core
+from warmslip.expressions import told
 from warmslip.laws import Law, Watched
 from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
 from warmslip.materials import contact_part, make_mesh, materials, of_dim
@@ -48,8 +50,10 @@ class Discretisation:
         return (self.dim * int(self.problem.moves) + int(self.problem.conducts)) * len(self.mesh.nodes)
 
     def stepper(self, *, backend: str = "automatic", tolerance: float | None = None) -> Any:
-        """A `_core.Stepper` at the initial data; `backend` is automatic, cholmod or petsc."""
+        """A `_core.Stepper` at the initial data; `backend` is automatic, cholmod or petsc. Raises ValueError for another one."""
         scene = self.scene
+        if backend not in _core.Backend.__members__:
+            raise ValueError(f"backend '{backend}' is unknown; use {', '.join(_core.Backend.__members__)}")
         options = _core.ContactOptions()
         if tolerance is not None:
             options.tolerance = tolerance
@@ -147,6 +151,22 @@ def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched
     return tried
 
 
+def _refuse_types(scene: Any, loads: Any, laws: Any) -> None:
+    """Raises TypeError, in a sentence, for what is easily given in the place of a scene, of loads or of laws."""
+    if not isinstance(scene, Scene):
+        cure = (
+            "read it with warmslip.load"
+            if isinstance(scene, str | Path)
+            else "warmslip.load and warmslip.Scene make one"
+        )
+        raise TypeError(f"scene: {told(scene)} is no Scene; {cure}")
+    if loads is not None and not isinstance(loads, Loads):
+        cure = "write dataclasses.replace(warmslip.Loads.of(scene), body=...) with the names of those that change"
+        raise TypeError(f"loads: {told(loads)} is no warmslip.Loads; {cure}")
+    if laws is not None and not isinstance(laws, dict):
+        raise TypeError(f"laws: {told(laws)} is no dictionary; give laws by part, {{'bottom': warmslip.Law(...)}}")
+
+
 def discretise(
     scene: Scene,
     *,
@@ -158,10 +178,11 @@ def discretise(
     """Assembles a scene on a communicator (default: all ranks).
 
     `loads` replaces the scene's, `mesh` its mesh, and `laws` the contact laws of the parts it names. Collective. Raises
-    ValueError when the contact part has no free node or a law is none.
+    TypeError for what is no scene, loads or laws, ValueError when the contact part has no free node or a law is none.
     """
     from mpi4py import MPI
 
+    _refuse_types(scene, loads, laws)
     comm = MPI.COMM_WORLD if comm is None else comm
     d = scene.mesh.dim
     given_loads = loads is not None

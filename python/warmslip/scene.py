@@ -181,8 +181,15 @@ def library() -> list[str]:
 def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
     """Reads a scene by library name or path and applies `key=value` overrides.
 
-    Raises SceneError with a sentence for each problem: missing file, bad TOML, unknown key, wrong type, value out of range.
+    Raises SceneError with a sentence for each problem: missing file, bad TOML, unknown key, wrong type, value out of range;
+    TypeError for arguments of another kind.
     """
+    if not isinstance(scene, str | Path):
+        raise TypeError(f"scene: {told(scene)} is neither a name of the library nor a path; give one")
+    if not isinstance(overrides, list | tuple | None) or not all(isinstance(one, str) for one in overrides or []):
+        raise TypeError(
+            f"overrides: {told(overrides)} is no list of texts; write ['mesh.n=8'], or load(...).override(**{{'mesh.n': 8}})"
+        )
     path = Path(scene)
     if str(scene) in library():
         text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text()

@@ -15,6 +15,7 @@ import pytest
 
 import warmslip
 from warmslip import Law, Scene
+from warmslip.export import export
 
 Small = Callable[..., Scene]
 STIFF, MU = 10.0, 0.4
@@ -301,3 +302,54 @@ def test_a_load_that_raises_later_ends_the_run_with_its_name(small: Small) -> No
     done = warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), source=late))
     assert (done.outcome, done.summary["steps"]) == ("data_not_finite", 2)
     assert done.summary["failure"]["reason"].startswith("heat.source at t = 0.6: the function raised KeyError('force')")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"scene": "x.toml"}, "scene: 'x.toml' is no Scene; read it with warmslip.load"),
+        ({"scene": Path("x.toml")}, "read it with warmslip.load"),
+        ({"scene": {"mesh": {"n": 4}}}, "scene: {'mesh': {'n': 4}} is no Scene; warmslip.load and"),
+        (
+            {"loads": {"body": [0.0, 1.0]}},
+            "loads: {'body': [0.0, 1.0]} is no warmslip.Loads; write dataclasses.replace",
+        ),
+        ({"loads": wrong}, "loads: the function wrong is no warmslip.Loads"),
+        ({"laws": linear}, "laws: the function linear is no dictionary; give laws by part"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(small: Small, given: dict[str, Any], words: str) -> None:
+    arguments = dict(given)
+    scene = arguments.pop("scene", small())
+    with pytest.raises(TypeError, match=re.escape(words)):
+        warmslip.run(scene, **arguments)
+
+
+def test_loads_of_another_kind_are_refused(small: Small) -> None:
+    scene = small()
+    loads = warmslip.Loads.of(scene)
+    with pytest.raises(
+        TypeError, match=re.escape("loads.traction: the function wrong is no dictionary; give it by part")
+    ):
+        replace(loads, traction=wrong)
+    with pytest.raises(ValueError, match=r"loads.displacement: 'left' is not held \(top\); name it in the scene's"):
+        warmslip.run(scene, loads=replace(loads, displacement={"left": [0.0, 1.0]}))  # which would do nothing
+    with pytest.raises(ValueError, match=r"loads\.gap: a list of 2; give one for each of 1 contact parts"):
+        warmslip.run(scene, loads=replace(loads, gap=[0.0, 1.0]))
+    with pytest.raises(ValueError, match="backend 'fast' is unknown; use automatic, cholmod, petsc"):
+        warmslip.run(scene, backend="fast")
+
+
+def test_what_load_and_export_are_given(small: Small, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="scene: 3 is neither a name of the library nor a path"):
+        warmslip.load(3)  # type: ignore[arg-type]
+    for overrides in ("mesh.n=8", {"mesh.n": 8}, [("mesh.n", 8)]):
+        with pytest.raises(
+            TypeError, match=re.escape("is no list of texts; write ['mesh.n=8'], or load(...).override")
+        ):
+            warmslip.load("paper_mixed", overrides)  # type: ignore[arg-type]
+    warmslip.run(small(time__steps=1), out=tmp_path)
+    with pytest.raises(TypeError, match=re.escape("fields: 'pressure' is no list; write ['pressure']")):
+        export(tmp_path, tmp_path / "series", fields="pressure")
+    with pytest.raises(TypeError, match=re.escape("times: 0.5 is no list; write [0.5]")):
+        export(tmp_path, tmp_path / "series", times=0.5)  # type: ignore[arg-type]
