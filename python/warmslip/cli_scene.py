@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from warmslip import scene as scenes
-from warmslip.cli_options import SceneName, Set, progress_bar
+from warmslip.cli_options import SceneName, Set, console, progress_bar
 from warmslip.scene import Scene, SceneError
 
 RunFolder = Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")]
@@ -85,8 +85,13 @@ def export(
             fields=names,
             times=_times(times),
             progress=lambda n, total: bar.update(task, completed=n, total=total),
+            say=lambda words: console.print(f"note: {words}", highlight=False, soft_wrap=True, markup=False),
         )
-    typer.echo(f"{count} states in {out}/body.pvd, contact points in contact.pvd, time series in series.csv")
+    body, points = ((out / f"{name}.pvd").exists() for name in ("body", "contact"))
+    where = f"{out}/body.pvd" if body else f"{out}/contact.pvd" if points else str(out)
+    typer.echo(
+        f"{count} states in {where}{', contact points in contact.pvd' * (body and points)}, time series in series.csv"
+    )
 
 
 def _times(text: str) -> list[float] | None:

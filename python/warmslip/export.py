@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import difflib
+import logging
+import re
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
@@ -16,6 +18,9 @@ from warmslip.problem import Discretisation
 from warmslip.state import contact_fields, resultants
 from warmslip.trajectory import Trajectory
 
+log = logging.getLogger(__name__)
+
+OWN = re.compile(r"(body|contact)(_\d{4,}\.vtu|\.pvd)")  # the files of a series
 STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 CONTACT = ("pressure", "friction traction", "gap", "slip", "status")
 FIELDS = (*BODY, *CONTACT)
@@ -57,14 +62,16 @@ def export(
     fields: Collection[str] = FIELDS,
     times: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    say: Callable[[str], None] = log.warning,
 ) -> int:
     """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
 
     body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
     contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
     `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
-    contact part, and the ledger of every step. Raises ValueError for what is no run, an unknown field or a time beyond the run,
-    OSError when it cannot be written.
+    contact part, and the ledger of every step. The files of an earlier series in `out` are removed. `say` is called with a
+    sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError for what
+    is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be written.
     """
     if isinstance(fields, str) or isinstance(times, str | float | int):
         name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
@@ -80,7 +87,16 @@ def export(
     with opened(run) as t:
         d = t.discretisation()
         chosen = range(len(t.time)) if times is None else sorted({state_number(t, time) for time in times})
+        if set(fields) != set(FIELDS):  # all that there are
+            fields = _there(t, d, fields, say)
+        for time in times or []:
+            taken = float(t.time[state_number(t, time)])
+            if abs(taken - time) > 1e-9 * d.scene.time.end:
+                say(f"no state is stored at t = {time:g}; the nearest, at t = {taken:g}, is taken")
         folder.mkdir(parents=True, exist_ok=True)
+        for earlier in folder.iterdir():
+            if OWN.fullmatch(earlier.name):
+                earlier.unlink()
         _series(t, d, folder / "series.csv")
         files: list[tuple[float, str]] = []
         points: list[tuple[float, str]] = []
@@ -100,6 +116,22 @@ def export(
             if series:
                 _pvd(folder / f"{name}.pvd", series)
     return len(chosen)
+
+
+def _there(t: Trajectory, d: Discretisation, fields: Collection[str], say: Callable[[str], None]) -> list[str]:
+    """The fields that the run has; says which it does not have. Raises ValueError when it has none of them."""
+    there = {
+        **dict.fromkeys(("displacement", "velocity", "stress", "von Mises"), t.u is not None),
+        "temperature": t.theta is not None,
+        **dict.fromkeys(CONTACT, len(d.surface.weights) > 0),
+    }
+    missing = [name for name in fields if not there[name]]
+    has = ", ".join(name for name in FIELDS if there[name])
+    if missing and len(missing) == len(fields):
+        raise ValueError(f"the run has no {', '.join(missing)}; choose from {has}")
+    for name in missing:
+        say(f"the run has no {name}, which is left out; it has {has}")
+    return [name for name in fields if there[name]]
 
 
 def _contact(path: Path, d: Discretisation, fields: dict[str, Array]) -> None:

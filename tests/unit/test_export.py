@@ -103,3 +103,42 @@ def test_a_mesh_file_that_has_changed_is_noticed(tmp_path: Path) -> None:
     meshio.write(tmp_path / "plate.msh", plate, file_format="gmsh22")
     with pytest.raises(ValueError, match="has changed since the run"):
         export(tmp_path / "run", tmp_path / "series")
+
+
+def test_a_series_holds_nothing_of_an_earlier_one(tmp_path: Path) -> None:
+    warmslip.run(warmslip.load("paper_mixed", ["mesh.n=4", "time.steps=4"]), out=tmp_path / "long")
+    warmslip.run(warmslip.load("heat_slab", ["time.steps=2"]), out=tmp_path / "short")
+    mine = ["body_final.vtu", "contact.csv", "my_body_0001.vtu"]
+    (tmp_path / "series").mkdir()
+    for name in mine:
+        (tmp_path / "series" / name).write_text("mine")
+    export(tmp_path / "long", tmp_path / "series")
+    with pytest.raises(ValueError, match="no field"):
+        export(tmp_path / "short", tmp_path / "series", fields=["heat"])
+    assert (tmp_path / "series/contact_0004.vtu").exists()  # a refusal takes nothing away
+    export(tmp_path / "short", tmp_path / "series")
+    names = {path.name for path in (tmp_path / "series").iterdir()}
+    assert names == {*mine, "body.pvd", "series.csv", *(f"body_{i:04d}.vtu" for i in range(3))}
+
+
+def test_what_the_run_does_not_have_is_said(tmp_path: Path) -> None:
+    warmslip.run(warmslip.load("quasistatic_punch", ["mesh.n=4", "time.steps=4"]), out=tmp_path / "run")
+    said: list[str] = []
+    export(tmp_path / "run", tmp_path / "series", say=said.append)
+    export(tmp_path / "run", tmp_path / "series", fields=["gap"], times=[0.5], say=said.append)
+    assert said == []
+    chosen = ["temperature", "displacement", "pressure"]
+    assert export(tmp_path / "run", tmp_path / "series", fields=chosen, times=[0.5, 0.6], say=said.append) == 1
+    assert said[0].startswith("the run has no temperature, which is left out; it has displacement, velocity, stress, ")
+    assert said[1:] == ["no state is stored at t = 0.6; the nearest, at t = 0.5, is taken"]
+    with pytest.raises(ValueError, match="the run has no temperature; choose from displacement"):
+        export(tmp_path / "run", tmp_path / "series", fields=["temperature"])
+
+
+def test_the_command_says_what_it_took(command: Command, tmp_path: Path) -> None:
+    command("run", "quasistatic_punch", "--set", "mesh.n=4", "--set", "time.steps=4", "--out", "run")
+    told = command("export", "run", "--out", "series", "--fields", "temperature,pressure", "--times", "0.3")
+    assert told.returncode == 0 and told.stdout.startswith("1 states in series/contact.pvd, time series in series.csv")
+    notes = told.stderr.splitlines()
+    assert len(notes) == 2 and all(note.startswith("note: ") for note in notes)
+    assert "no temperature" in notes[0] and "at t = 0.25, is taken" in notes[1]
