@@ -6,6 +6,7 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from conftest import Command
@@ -14,6 +15,7 @@ from PIL import Image
 import warmslip
 from warmslip import Scene, view
 from warmslip.export import opened
+from warmslip.figures import run as drawings
 from warmslip.view import _along, body
 
 Small = Callable[..., Scene]
@@ -125,3 +127,48 @@ def test_the_command_says_what_it_wrote_and_what_it_cannot(command: Command) -> 
     wrong = command("export", "run", "--out", "series", "--fields", "presure")
     assert wrong.returncode == 2 and "did you mean 'pressure'?" in wrong.stderr
     assert command("export", "run", "--out", "series", "--times", "soon").returncode == 2
+
+
+def test_a_status_has_one_colour_in_every_figure(small: Small, tmp_path: Path) -> None:
+    warmslip.run(small(), out=tmp_path)
+    with opened(tmp_path) as t:
+        d = t.discretisation()
+        last, parts, history = body(t, d, 4), view._parts(t, d, 4), view._history(t, d)
+        shown, told = drawings.bodies(last, 5.0)
+        points, _ = drawings.contact(parts, 1.0)
+        lines, _ = drawings.history(t.series("steps")["time"], history)
+    for figure in (shown, points):
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == [name for name, _ in drawings.STATUS]
+        assert [dot.get_markerfacecolor() for dot in legend.legend_handles] == [c for _, c in drawings.STATUS]
+    (panel,) = (ax for ax in lines.axes if ax.get_title() == "contact points")
+    assert [(line.get_label(), line.get_color()) for line in panel.lines] == list(drawings.STATUS)
+    present = {drawings.STATUS[int(i)][1] for i in last.status}
+    assert {dot.get_markerfacecolor() for dot in shown.axes[0].lines if len(dot.get_xdata())} == present
+    assert shown.get_suptitle() == "t = 1, displacement 5 times magnified" and "5 times magnified" in told
+    plain, said = drawings.bodies(last, 1.0)
+    assert plain.get_suptitle() == "t = 1" and "magnified" not in said
+    for figure in (shown, points, lines, plain):
+        plt.close(figure)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 6])
+def test_a_history_has_no_hole(count: int) -> None:
+    time = np.arange(1.0, 4.0)
+    figure, _ = drawings.history(time, {f"panel {i}": {"one": time} for i in range(count)})
+    grid = figure.axes[0].get_gridspec()
+    taken = [ax.get_subplotspec() for ax in figure.axes if ax.get_visible()]
+    assert sum((s.rowspan.stop - s.rowspan.start) * (s.colspan.stop - s.colspan.start) for s in taken) == (
+        grid.nrows * grid.ncols
+    )
+    plt.close(figure)
+
+
+def test_a_flat_body_has_a_flat_figure() -> None:
+    nodes, nothing = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 1.0]]), np.zeros((3, 2))
+    flat = drawings.Body(
+        0.0, nodes, np.array([[0, 1, 2]]), nothing, {"displacement": np.arange(3.0)}, *[nothing[:0]] * 3
+    )
+    figure, _ = drawings.bodies(flat, 1.0)
+    assert figure.get_figheight() < 2.2 and not figure.legends
+    plt.close(figure)

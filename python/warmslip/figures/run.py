@@ -14,15 +14,18 @@ from matplotlib.animation import PillowWriter
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, number
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MAPS = {"displacement": cm.imola, "von Mises stress": cm.batlow, "temperature": cm.lipari}
-STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))
+STATUS = (("open", GREY), ("stick", SKY), ("slip", VERMILLION))  # the same in every figure of a run
+COLOURS_OF_STATUS = "grey, blue, red"
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, INK)
 WIDTHS = {2: 3.9, 3: 4.6}
+DOT: Any = {"ms": 3.5, "mec": INK, "mew": 0.5}
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def panel(
         at = body.points + factor * body.moved
         for number_, (_, colour) in enumerate(STATUS):
             on = body.status == number_
-            ax.plot(*at[on].T, "o", ms=3.5, mfc=colour, mec=INK, mew=0.5)
+            ax.plot(*at[on].T, "o", mfc=colour, **DOT)
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.spines[:].set_visible(False)
@@ -105,10 +108,28 @@ def norm_of(bodies: Iterable[Body], name: str) -> Normalize:
     return Normalize(low, high if high > low else low + 1e-12 + abs(low))
 
 
+def legend_of_status(figure: Figure) -> None:
+    """What the colours of the contact points say, below the panels."""
+    dots = [Line2D([], [], ls="", marker="o", mfc=colour, label=name, **DOT) for name, colour in STATUS]
+    figure.legend(handles=dots, loc="outside lower center", ncols=len(dots), handletextpad=0.1, columnspacing=1.5)
+
+
+def _height(body: Body, factor: float) -> float:
+    """Of a figure whose panels leave no empty bands above and below a flat body, inches."""
+    if body.dim == 3:
+        return 3.8
+    seen = np.ptp(np.concatenate([body.nodes, body.nodes + factor * body.u]), axis=0)
+    return float(np.clip(1.2 + 2.9 * seen[1] / seen[0], 1.9, 3.9))
+
+
 def bodies(body: Body, factor: float) -> tuple[Figure, str]:
     """The body, a panel a field."""
     names = list(body.fields)
-    figure = plt.figure(figsize=(WIDTHS[body.dim] * len(names), 3.6), layout="compressed")
+    figure = plt.figure(figsize=(WIDTHS[body.dim] * len(names), _height(body, factor)), layout="compressed")
+    magnified = f", displacement {factor:g} times magnified" if factor != 1 else ""
+    figure.suptitle(f"t = {number(body.time)}{magnified}", fontsize=10)
+    if len(body.points) and body.dim == 2:
+        legend_of_status(figure)
     grid = figure.add_gridspec(1, len(names))
     for i, name in enumerate(names):
         panel(figure, grid[i], body, name, factor=factor, norm=norm_of([body], name))
@@ -119,13 +140,9 @@ def bodies(body: Body, factor: float) -> tuple[Figure, str]:
             f"{int((body.status == i).sum())} {name}" for i, (name, _) in enumerate(STATUS)
         )
         if body.dim == 2:
-            points += " (white, blue, red)"
-    shown = (
-        f"displacement {factor:g} times magnified, dashed the undeformed outline"
-        if body.dim == 2
-        else (f"displacement {factor:g} times magnified")
-    )
-    return figure, f"The body at t = {number(body.time)}, {shown}: {'; '.join(said)}{points}."
+            points += f" ({COLOURS_OF_STATUS})"
+    dashed = ", dashed the undeformed outline" * (body.dim == 2)
+    return figure, f"The body at t = {number(body.time)}{magnified}{dashed}: {'; '.join(said)}{points}."
 
 
 def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, str]:
@@ -138,7 +155,7 @@ def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, st
             if x.ndim == 1:
                 for i, (_, colour) in enumerate(STATUS):
                     on = fields["status"] == i
-                    ax.plot(x[on], values[on], "o", ms=4, mfc=colour, mec=INK, mew=0.5)
+                    ax.plot(x[on], values[on], "o", mfc=colour, **DOT)
                 ax.plot(x, values, "-", color=GREY, lw=0.8, zorder=0)
                 ax.axhline(0, color=GREY, lw=0.5)
                 ax.set_xlabel("along the part")
@@ -148,19 +165,26 @@ def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, st
                 ax.set_aspect("equal")
             ax.set_title(f"{part}: {name}")
     largest = [f"{part} {number(float(f['pressure'].max()))}" for part, f in parts.items()]
-    return figure, (
-        f"Contact at t = {number(time)}; white points are open, blue ones stick, red ones slip. Largest pressure: "
-        f"{', '.join(largest)}."
-    )
+    told = f"Contact at t = {number(time)}"
+    if any(fields["position"].ndim == 1 for fields in parts.values()):
+        legend_of_status(figure)
+        told += f"; points that are open, stick, slip are {COLOURS_OF_STATUS}"
+    return figure, f"{told}. Largest pressure: {', '.join(largest)}."
 
 
 def history(time: Array, panels: dict[str, dict[str, Array]]) -> tuple[Figure, str]:
     """Time series, a panel a group; the group `residuals` on a logarithmic axis."""
     columns = min(2, len(panels))
     lines = -(-len(panels) // columns)
-    figure, axes = plt.subplots(lines, columns, figsize=(5.2 * columns, 2.6 * lines), squeeze=False, sharex=True)
-    for ax, (title, series) in zip(axes.flat, panels.items(), strict=False):
-        for (name, values), colour in zip(series.items(), COLOURS * 4, strict=False):
+    figure = plt.figure(figsize=(5.2 * columns, 2.6 * lines))
+    grid = figure.add_gridspec(lines, columns)
+    alone = len(panels) % columns == 1  # the last panel then takes its line, and its ticks are not those above
+    for i, (title, series) in enumerate(panels.items()):
+        line, column = divmod(i, columns)
+        last = line == lines - 1
+        ax = figure.add_subplot(grid[line, :] if alone and last else grid[line, column])
+        for (name, values), other in zip(series.items(), COLOURS * 4, strict=False):
+            colour = dict(STATUS).get(name, other) if title == "contact points" else other
             ax.plot(
                 time, np.where(values > 0, values, np.nan) if title == "residuals" else values, color=colour, label=name
             )
@@ -168,10 +192,10 @@ def history(time: Array, panels: dict[str, dict[str, Array]]) -> tuple[Figure, s
             ax.set_yscale("log")
         ax.set_title(title)
         ax.legend(loc="best", fontsize=7)
-    for ax in axes.flat[len(panels) :]:
-        ax.set_visible(False)
-    for ax in axes[-1]:
-        ax.set_xlabel("t")
+        if last:
+            ax.set_xlabel("t")
+        elif not alone:
+            ax.tick_params(labelbottom=False)
     return figure, f"{len(time)} steps to t = {number(float(time[-1]))}: {', '.join(panels)}."
 
 
