@@ -38,6 +38,12 @@ def test_every_scene_has_its_number() -> None:
     assert set(library()) == set(PINNED) | LARGE
 
 
+def test_first_steps_lists_what_the_command_lists(command: Command) -> None:
+    page = (Path(__file__).parents[2] / "python/docs/tutorial.md").read_text()
+    shown = page.partition("$ warmslip list\n")[2].partition("$ ")[0]
+    assert shown == command("list").stdout
+
+
 @pytest.mark.parametrize("name", PINNED)
 def test_a_scene_from_its_file_and_from_python(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = Path(str(resources.files("warmslip") / "scenes"))
