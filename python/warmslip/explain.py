@@ -1,4 +1,4 @@
-"""What a scene will do before it runs: fields, operators, solver, cost, what could be left out, what may be missing."""
+"""What a scene will do before it runs: fields, operators, solver, cost, what could be left out, what is missing or odd."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ class Plan:
     removable: dict[str, str] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
+    suspicious: list[str] = field(default_factory=list)  # what is there, can be meant, and often is not
     solver: str = ""
     setup_seconds: float = 0.0  # wall time on this machine and these ranks
     step_seconds: float = 0.0
@@ -146,6 +147,7 @@ def plan(scene: Scene) -> Plan:
             for c in touching
             if c.friction is not None and c.friction.regularisation
         ]
+    steps += _heat_by_contact(touching)
     return Plan(
         fields=fields,
         operators=[f"{name}: constant, assembled once" for name, there in present.items() if there],
@@ -153,7 +155,21 @@ def plan(scene: Scene) -> Plan:
         removable=removable(scene),
         kept=_kept(scene),
         missing=_missing(scene),
+        suspicious=_suspicious(scene),
     )
+
+
+def _heat_by_contact(touching: list[ContactTable]) -> list[str]:
+    """What is solved on the contact nodes, as it is not the same in every step."""
+    out = []
+    for c in touching:
+        exchange = c.heat_exchange
+        if exchange is not None and exchange.per_pressure:
+            conductance = f"{exchange.conductance:g} + {exchange.per_pressure:g} times the pressure"
+            out.append(f"heat exchange on '{c.part}' at its contact nodes, with the conductance {conductance}")
+        if c.friction_heating is not None and c.friction_heating.share:
+            out.append(f"heat of friction on '{c.part}', of which {c.friction_heating.share:g} goes into the body")
+    return out
 
 
 def _piecewise_linear(c: ContactTable) -> bool:
@@ -180,8 +196,6 @@ def _missing(scene: Scene) -> list[str]:
     for c in scene.contacts:
         if c.stiffness is not None and c.friction is None:
             out.append(f"no friction on '{c.part}': it slides freely")
-        if isinstance(c.gap, float) and c.gap < 0:
-            out.append(f"the gap of '{c.part}' is negative: the body starts inside the foundation")
         if scene.heat is not None and c.heat_exchange is None:
             out.append(f"no heat exchange on '{c.part}': the foundation is insulated")
     if scene.moves and scene.elasticity is None:
@@ -190,19 +204,26 @@ def _missing(scene: Scene) -> list[str]:
         out.append("no viscosity: only backward Euler damps the motion, the more the longer the step")
     if scene.moves and scene.inertia is None:
         out.append("no inertia: every step is in equilibrium")
-    for c in scene.contacts:
-        if c.friction is not None and c.friction.cohesion:
-            out.append(f"friction on '{c.part}' has a cohesion, which acts also where there is no pressure")
-    if (
-        scene.initial.velocity is not None
-        and scene.moves
-        and scene.inertia is None
-        and not _zero(scene.initial.velocity)
-    ):
-        out.append("the initial velocity moves nothing: there is no inertia")
     leads = any(c.heat_exchange is not None for c in scene.contacts)
     if scene.heat is not None and not scene.supports.temperature and not leads:
         out.append("no support holds a temperature and no foundation takes heat: what is supplied stays in the body")
+    return out
+
+
+def _suspicious(scene: Scene) -> list[str]:
+    out = []
+    for c in scene.contacts:
+        if isinstance(c.gap, float) and c.gap < 0:
+            out.append(f"the gap of '{c.part}' is negative: the body starts inside the foundation")
+        if c.stiffness is not None and c.part in scene.loads.traction and not _zero(scene.loads.traction[c.part]):
+            out.append(
+                f"a traction pulls or presses on '{c.part}', which is also a contact part: it acts besides the contact force"
+            )
+        if c.friction is not None and c.friction.cohesion:
+            out.append(f"friction on '{c.part}' has a cohesion, which acts also where there is no pressure")
+    moved = scene.initial.velocity is not None and not _zero(scene.initial.velocity)
+    if moved and scene.moves and scene.inertia is None:
+        out.append("the initial velocity moves nothing: there is no inertia")
     return out
 
 
@@ -222,6 +243,7 @@ def text(found: Plan) -> str:
         ),
         *block("stays", found.kept),
         *block("not in this scene", found.missing),
+        *block("there, and worth a second look", found.suspicious),
     ]
     if found.seconds == found.seconds and found.seconds > 0:
         out += block(

@@ -254,4 +254,31 @@ def test_what_a_plan_counts_and_warns_of() -> None:
     found = estimate.measured(warmslip.load("two_materials"))
     assert any(line.startswith("region 'insert': ") and line.endswith("of 512 cells") for line in found.fields)
     sunk = explain.plan(warmslip.load("quasistatic_punch").override(**{"contact.gap": -0.01}))
-    assert "the gap of 'bottom' is negative: the body starts inside the foundation" in sunk.missing
+    assert "the gap of 'bottom' is negative: the body starts inside the foundation" in sunk.suspicious
+
+
+def test_what_is_there_and_suspicious_has_its_own_paragraph() -> None:
+    scene = warmslip.load("quasistatic_punch")
+    assert "second look" not in explain.text(explain.plan(scene))
+    odd = scene.override(
+        **{"contact.gap": -0.01, "loads.traction": {"bottom": [0.0, "t"]}, "contact.friction.cohesion": 0.1}
+    )
+    found = explain.plan(odd.override(**{"initial.velocity": [1.0, 0.0]}))
+    _, heading, remarks = explain.text(found).partition("there, and worth a second look\n")
+    assert heading and len(remarks.splitlines()) == 4
+    for words in ("starts inside", "'bottom', which is also a contact part", "has a cohesion", "moves nothing"):
+        assert words in remarks
+        assert not any(words in line for line in found.missing)
+    idle = explain.plan(scene.override(**{"loads.traction": {"bottom": [0.0, 0.0]}}))
+    assert idle.suspicious == []
+
+
+def test_a_plan_states_the_heat_that_contact_leads_and_makes() -> None:
+    scene = warmslip.load("brake_pad")
+    exchange, share = scene.contacts[0].heat_exchange, scene.contacts[0].friction_heating.share
+    values = {"contact.heat_exchange.conductance": 2.0, "contact.heat_exchange.per_pressure": 0.5}
+    said = explain.text(explain.plan(scene.override(**values)))
+    assert "heat exchange on 'bottom' at its contact nodes, with the conductance 2 + 0.5 times the pressure" in said
+    assert f"heat of friction on 'bottom', of which {share:g} goes into the body" in said
+    assert (exchange.per_pressure > 0) == ("times the pressure" in explain.text(explain.plan(scene)))
+    assert "times the pressure" not in explain.text(explain.plan(warmslip.load("paper_mixed")))
