@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 import warnings
 from types import FunctionType
@@ -38,6 +39,20 @@ NODES = (
     *(ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.Mod, ast.USub, ast.UAdd, ast.And, ast.Or),
     *(ast.Lt, ast.LtE, ast.Gt, ast.GtE),
 )
+
+
+NUMBER = r"([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?![\w.])"
+
+
+def decimal_comma(text: str) -> str:
+    """The cure for a decimal comma in a text that could not be read, or nothing. One in brackets may part two values."""
+    if len(text) > LONGEST:
+        return ""
+    bare, before = "" if text.startswith("[") else text, ""
+    while bare != before:
+        bare, before = re.sub(r"\([^()]*\)", "", bare), bare
+    found = re.search(rf"(?<![\w.,]){NUMBER}", bare) or re.search(r"(?<![\w.])([-+]?\d+),(0\d+)", text)
+    return f"write {found[1]}.{found[2]} with a point" if found else ""
 
 
 class _Numexpr(ast.NodeTransformer):
@@ -111,11 +126,15 @@ class Expression:
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
             for node in ast.walk(tree):
+                if isinstance(node, ast.Tuple) and (cure := decimal_comma(text)):
+                    raise ValueError(f"in '{text}': a decimal comma; {cure}")
                 if problem := _problem(node):
                     raise ValueError(f"in '{text}': {problem}")
             self.names = frozenset(n.id for n in ast.walk(tree) if isinstance(n, ast.Name)) & set(VARIABLES)
             self._numexpr = ast.unparse(ast.fix_missing_locations(_Numexpr().visit(tree)))
         except (SyntaxError, RecursionError, MemoryError, OverflowError) as error:
+            if isinstance(error, SyntaxError) and (cure := decimal_comma(text)):
+                raise ValueError(f"in '{text}': a decimal comma; {cure}") from None
             raise ValueError(f"'{text}' is not a formula ({getattr(error, 'msg', None) or error})") from None
         # types are wrong here or nowhere
         self.condition = self._evaluate(np.full((1, 3), 0.5), 0.5).dtype == bool

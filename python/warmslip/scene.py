@@ -16,7 +16,7 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 from warmslip import full_tables, mesh_files
 from warmslip import tables as t
 from warmslip.consistency import problems
-from warmslip.expressions import told
+from warmslip.expressions import NUMBER, decimal_comma, told
 
 
 class SceneError(ValueError):
@@ -215,6 +215,9 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
             raise SceneError(
                 "contact: [contact] is one part, [[contact]] one of several; write [[contact]] for each"
             ) from None
+        line, cure = _comma(text, str(error))
+        if line:
+            raise SceneError(f"scene '{scene}' has a decimal comma in line {line}; {cure}") from None
         raise SceneError(f"scene '{scene}' is not valid TOML: {error}; correct that line") from None
     except (ValueError, RecursionError) as error:
         raise SceneError(f"scene '{scene}' cannot be read ({_limit(error)}); write it more plainly") from None
@@ -222,17 +225,32 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
             raise SceneError(f"'{item}' is no override; write table.key=value")
-        _set(data, key.strip(), _parse(value.strip()))
+        _set(data, key.strip(), _parse(key.strip(), value.strip()))
     mesh = data.get("mesh")
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) and path.exists():
         mesh["file"] = str(path.parent / mesh["file"])  # a mesh lies beside its scene
     return build(data)
 
 
-def _parse(text: str) -> Any:
+def _comma(text: str, error: str) -> tuple[int, str]:
+    """The line of a decimal comma at the place where tomllib gave up, and its cure; or 0 and nothing."""
+    if at := re.search(r"at line (\d+), column (\d+)", error):
+        line, column = int(at[1]), int(at[2]) - 1
+        for found in re.finditer(rf"=[ \t]*{NUMBER}|[\[,][ \t]*([-+]?\d+),(0\d+)", here := text.split("\n")[line - 1]):
+            if found.start() <= column and not here[found.end() : column].strip():
+                whole, part = (found[1], found[2]) if found[1] else (found[3], found[4])
+                return line, f"write {whole}.{part} with a point"
+    return 0, ""
+
+
+def _parse(key: str, text: str) -> Any:
+    """The value of an override; what is no TOML is a text. Raises SceneError for a list or a table with a decimal comma."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError) as error:
+        _, cure = _comma(f"value = {text}", str(error)) if text.startswith(("[", "{")) else (0, "")
+        if cure:
+            raise SceneError(f"{key} = {told(text)}: a decimal comma; {cure}") from None
         return text
 
 
@@ -245,16 +263,20 @@ def _set(data: dict[str, Any], key: str, value: Any) -> None:
     *tables, last = key.split(".")
     place: Any = data
     for depth, table in enumerate(tables):
-        here = ".".join(tables[: depth + 1])
+        here, rest = ".".join(tables[: depth + 1]), [*tables[depth + 1 :], last]
         if isinstance(place, list):  # of contact parts
-            if not table.isdigit() or int(table) >= len(place):
-                raise SceneError(f"{key}: give the number of the contact part, 0 to {len(place) - 1}")
             place = place[int(table)]
+        elif here == f"contact.{table}" and table.isdecimal() and table not in place:
+            raise SceneError(f"{key}: there is one contact part; write {'.'.join(['contact', *rest])}")
         else:
             place = place.setdefault(table, {})
-        if isinstance(place, list) and not (depth + 1 < len(tables) and place and isinstance(place[0], dict)):
-            raise SceneError(f"{key}: '{here}' is a value, not a table")
-        if not isinstance(place, dict | list):
+        if isinstance(place, list) and place and isinstance(place[0], dict):
+            if len(rest) < 2 or not rest[0].isdecimal() or int(rest[0]) >= len(place):
+                names = [str(one.get("part")) for one in place if isinstance(one, dict)]
+                number = names.index(rest[0]) if rest[0] in names else 0
+                named = ".".join(rest[rest[0].isdecimal() or rest[0] in names :]) or "KEY"
+                raise SceneError(f"{key}: {here} has the parts 0 to {len(place) - 1}; write {here}.{number}.{named}")
+        elif not isinstance(place, dict):
             raise SceneError(f"{key}: '{here}' is a value, not a table")
     if value is None:
         place.pop(last, None)
@@ -315,6 +337,8 @@ def _sentence(error: Any, where: list[str]) -> str:
             return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where))}"
         case "finite_number":
             return f"{key}: {given} is not a finite number; give one"
+        case _ if isinstance(error.get("input"), str) and (cure := decimal_comma(error["input"])):
+            return f"{key} = {given}: a decimal comma; {cure}"
         case _:
             return f"{key} = {given}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
 

@@ -124,6 +124,77 @@ def test_refuses_files(tmp_path: Path, text: str | bytes | None, words: str) -> 
         load(path)
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("stiffness = 0,5", "has a decimal comma in line 10; write 0.5 with a point"),
+        ("stiffness = -1,5e3 # soft", "write -1.5e3 with a point"),
+        ("stiffness = 0,05", "write 0.05 with a point"),
+        ("friction = { coefficient = 0,3 }", "write 0.3 with a point"),
+        ("gap = [1,05, 2]", "write 1.05 with a point"),
+        ("stiffness = '0,5'", "contact.stiffness = '0,5': a decimal comma; write 0.5 with a point"),
+        ("gap = '0,5 * x'", "contact.gap: in '0,5 * x': a decimal comma; write 0.5 with a point"),
+        ("gap = 'x-0,05'", "write 0.05 with a point"),
+        ("gap = 'max(1,2) + 0,5'", "write 0.5 with a point"),
+        ("stiffness = 05", "is not valid TOML"),
+        ("stiffness = 1,", "is not valid TOML"),
+        ("gap = '(x, 1)'", "is no part of a formula"),
+    ],
+)
+def test_a_decimal_comma_is_noticed(tmp_path: Path, line: str, words: str) -> None:
+    tables = (
+        "mesh.n = 4",
+        "time.steps = 1",
+        "[elasticity]",
+        "lame = [1.0, 1.0]",
+        "[supports]",
+        "displacement = ['top']",
+    )
+    path = tmp_path / "scene.toml"
+    path.write_text("\n".join([*tables, "", "[contact]", "part = 'bottom'", line, "exponent = 1.5"]))
+    with pytest.raises(SceneError) as refusal:
+        load(path)
+    assert words in str(refusal.value) and "\n" not in str(refusal.value)
+    assert ("a decimal comma" in str(refusal.value)) == ("point" in words)
+
+
+@pytest.mark.parametrize(
+    ("override", "cure"),
+    [
+        ("contact.stiffness=0,5", "0.5"),
+        ("contact.gap=0,05", "0.05"),
+        ("initial.velocity=[0.0,-1,05]", "-1.05"),
+        ("contact.friction={coefficient=0,3}", "0.3"),
+    ],
+)
+def test_a_decimal_comma_in_an_override_is_noticed(override: str, cure: str) -> None:
+    with pytest.raises(SceneError, match="a decimal comma") as refusal:
+        load("paper_mixed", [override])
+    assert str(refusal.value).startswith(override.partition("=")[0])
+    assert str(refusal.value).endswith(f"write {cure} with a point")
+    assert load("paper_mixed", ["title=1,5 m", "contact.gap=max(0,5*x)"]).title == "1,5 m"
+
+
+def test_a_contact_part_is_named_by_its_number() -> None:
+    one = load("paper_mixed")
+    part = one.resolved()["contact"]
+    free = {"supports.displacement": ["top"], "supports.temperature": ["top"], "loads.traction": {}}
+    two = one.override(contact=[part, part | {"part": "left"}], **free)
+    for key, cure in {
+        "contact.stiffness": "contact.0.stiffness",
+        "contact.friction.coefficient": "contact.0.friction.coefficient",
+        "contact.2.friction.coefficient": "contact.0.friction.coefficient",
+        "contact.left.stiffness": "contact.1.stiffness",
+        "contact.0": "contact.0.KEY",
+    }.items():
+        with pytest.raises(SceneError) as refusal:
+            two.override(**{key: 0.1})
+        assert str(refusal.value) == f"{key}: contact has the parts 0 to 1; write {cure}"
+    assert two.override(**{"contact.1.friction.coefficient": 0.1}).contacts[1].friction.coefficient == 0.1
+    with pytest.raises(SceneError, match=r"there is one contact part; write contact\.friction\.coefficient"):
+        one.override(**{"contact.0.friction.coefficient": 0.1})
+
+
 def test_library_scenes_load_and_say_what_they_are() -> None:
     assert {f"paper_{r}" for r in ("printed", "mixed", "isotropic", "consistent")} | {"block_3d"} <= set(library())
     for name in library():

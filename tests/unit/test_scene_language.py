@@ -171,7 +171,7 @@ def test_keys_of_several_contact_parts() -> None:
     assert scene.override(**{"contact.1.gap": "x"}).contacts[1].gap == "x"
     assert load("paper_mixed", ["contact=[{part='bottom', stiffness=1.0}]", "contact.0.gap=0.5"]).contacts[0].gap == 0.5
     for key in ("contact.2.gap", "contact.bottom.gap", "contact.gap.x"):
-        with pytest.raises(SceneError, match="give the number of the contact part, 0 to 1"):
+        with pytest.raises(SceneError, match=r"contact has the parts 0 to 1; write contact\.0\.gap"):
             scene.override(**{key: 1.0})
 
 
