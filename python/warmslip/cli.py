@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.logging import RichHandler
@@ -58,11 +59,20 @@ app.command("list")(cli_scene.list_)
 def main() -> None:
     """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
     try:
-        app(standalone_mode=True)
+        code = app(
+            prog_name="warmslip", standalone_mode=False
+        )  # else typer draws a box around what is wrong with a call
+        sys.exit(code if isinstance(code, int) else 0)
     except SceneError as error:  # every rank reads the same scene and refuses it alike
         _say(str(error), everywhere=False)
         sys.exit(2)
     except Exception as error:
+        if hasattr(error, "format_message"):  # of the call itself; typer brings a click of its own, or uses another's
+            if type(error).__name__ == "NoArgsIsHelpError":
+                error.show()  # type: ignore[attr-defined]
+            else:
+                _say(_misused(error), everywhere=False)
+            sys.exit(2)
         if os.environ.get("WARMSLIP_DEBUG"):
             raise
         message, code = _explain(error)
@@ -73,6 +83,22 @@ def main() -> None:
             sys.stderr.flush()
             MPI.COMM_WORLD.Abort(code)
         sys.exit(code)
+
+
+def _misused(error: Any) -> str:
+    """A sentence about a call that has not the form of the command."""
+    context, said = getattr(error, "ctx", None), " ".join(error.format_message().split()).rstrip(".")
+    if context is None:
+        return f"{said[0].lower()}{said[1:]}; see `warmslip --help`"
+    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)$", said):
+        words = extra[1].split()
+        if all("=" in word for word in words) and any(one.name == "set_" for one in context.command.params):
+            return f"a key of the scene needs --set; write {' '.join(f'--set {word}' for word in words)}"
+        return f"'{extra[1]}' is too much for `{context.command_path}`; leave it out, or see its --help"
+    said, near, guess = said.partition(". Did you mean")
+    if near:
+        return f"{said[0].lower()}{said[1:]}; did you mean{guess}"
+    return f"{said[0].lower()}{said[1:]}; see `{context.command_path} --help`"
 
 
 def _explain(error: Exception) -> tuple[str, int]:

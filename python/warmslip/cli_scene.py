@@ -34,6 +34,7 @@ def run(
         explain(scene, set_, trial=False)
         return
     checked = scenes.load(scene, set_)
+    _refuse_dashless(petsc)
     if petsc:  # read once, when PETSc starts; it says at the end which of them nothing has used
         os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} {petsc} -options_left"
     from mpi4py import MPI
@@ -52,6 +53,15 @@ def run(
         typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
     if not result.right:
         raise typer.Exit(130 if result.outcome == "interrupted" else 1)
+
+
+def _refuse_dashless(petsc: str) -> None:
+    """Raises SceneError for a word that PETSc would pass over in silence: neither an option nor the value of one."""
+    before = ""
+    for word in petsc.split():
+        if not word.startswith("-") and not before.startswith("-"):
+            raise SceneError(f"--petsc: '{word}' is neither an option nor the value of one; write -{word}")
+        before = word
 
 
 def _told(summary: dict[str, Any]) -> str:

@@ -48,6 +48,42 @@ def test_refusals(command: Command, tmp_path: Path, arguments: list[str], lines:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "paper_mixed", "mesh.n=16"], "a key of the scene needs --set; write --set mesh.n=16"),
+        (["run", "paper_mixed", "mesh.n=4", "time.steps=2"], "write --set mesh.n=4 --set time.steps=2"),
+        (["run", "paper_mixed", "again"], "'again' is too much for `warmslip run`; leave it out"),
+        (["view", "run", "mesh.n=4", "--out", "a"], "'mesh.n=4' is too much for `warmslip view`"),
+        (["run"], "missing argument 'scene'; see `warmslip run --help`"),
+        (["view", "run"], "missing option '--out'; see `warmslip view --help`"),
+        (["view", "run", "--out", "a", "--at", "soon"], "invalid value for '--at'"),
+        (["run", "paper_mixed", "--sett", "a=1"], "no such option: --sett"),
+        (["run", "paper_mixed", "--set"], "option '--set' requires an argument"),
+        (["rum", "paper_mixed"], "no such command 'rum'; did you mean 'run'?"),
+        (
+            ["run", "paper_mixed", "--petsc", "log_view"],
+            "'log_view' is neither an option nor the value of one; write -log_view",
+        ),
+        (["run", "paper_mixed", "--petsc", "-ksp_rtol 1e-3 log_view"], "write -log_view"),
+    ],
+)
+def test_a_call_of_the_wrong_form_is_one_sentence(
+    command: Command, tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    result = command(*arguments)
+    (line,) = result.stderr.splitlines()
+    assert (result.returncode, result.stdout) == (2, "")
+    assert line.startswith("error: ") and said in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_is_help(command: Command) -> None:
+    assert command("--help").returncode == command("run", "--help").returncode == 0
+    alone = command()
+    assert alone.returncode == 2 and "Usage" in alone.stdout + alone.stderr
+
+
 def test_output_folder_that_is_a_file(command: Command, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     result = command("run", "paper_mixed", *SMALL, "--out", "taken")
