@@ -117,11 +117,11 @@ def papers(scene: FullScene) -> bool:
 
 
 def table(path: Path, scene: Row) -> list[Row]:
-    """Orders along the diagonal h = k of one study; `scene` is the resolved scene of its stamp.
+    """Orders along the diagonal h = k (of a mesh file h ~ k) of one study; `scene` is the resolved scene of its stamp.
 
     A sum of terms has no corrected order, as its terms are corrected in different ways; a scene that is not the paper's has no
     entitled one here (`warmslip check` states what its corners and its start allow). Raises ValueError for fewer than three
-    levels with h = k.
+    levels there.
     """
     rows = read(path)
     try:
@@ -129,9 +129,14 @@ def table(path: Path, scene: Row) -> list[Row]:
     except SceneError:  # not of the paper's kind
         built = None
     reference = rows[-1]["h"]
-    diagonal = sorted((r for r in rows[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
+    # in a study of a mesh file n counts pieces of an edge, and steps are that many times the scene's: h ~ k in place of h = k
+    pace = rows[-1]["steps"] / rows[-1]["n"]
+    diagonal = sorted((r for r in rows[:-1] if r["steps"] == pace * r["n"]), key=lambda r: -r["h"])
     if len(diagonal) < 3:
-        raise ValueError(f"{path}: {len(diagonal)} levels with h = k say nothing about an order; give at least three")
+        raise ValueError(
+            f"{path}: an order needs three levels on which h and k shrink together, here are {len(diagonal)}; give "
+            "`warmslip study` three --levels or more"
+        )
     out: list[Row] = []
     for term in [*TERMS, *SUMS]:
         limit = float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -113,8 +114,24 @@ def test_table_of_orders(tmp_path: Path) -> None:
     assert {r["entitled"] for r in own} == {1.0}
     assert all(math.isnan(r["corrected"]) for r in found if r["term"] in SUMS)
     few = write(tmp_path / "few_0_staggered.csv", [*rows[:2], study_rows()[-1]])
-    with pytest.raises(ValueError, match="2 levels with h = k say nothing about an order"):
+    with pytest.raises(
+        ValueError, match="needs three levels on which h and k shrink together, here are 2; give `warmslip"
+    ):
         rates.table(few, scene)
+
+
+def test_orders_of_a_mesh_file(tmp_path: Path) -> None:
+    """Whose levels are pieces of an edge, with as many times the scene's steps."""
+    scene = warmslip.load("plate_with_hole").override(**{"time.steps": 2})
+    rows = study.study(scene, levels=[1, 2, 4], reference=8)
+    assert [row["steps"] for row in rows] == [2, 4, 8, 16]
+    study.write(tmp_path / "plate.csv", rows, {})
+    found = [row for row in rates.table(tmp_path / "plate.csv", scene.resolved()) if row["term"] == "theta_L2"]
+    assert [row["h"] for row in found] == [1.0, 0.5, 0.25]
+    assert [row["observed"] for row in found[1:]] == [
+        rates.observed(coarse["e_theta_L2"], fine["e_theta_L2"]) for coarse, fine in pairwise(rows[:3])
+    ]
+    assert 0.3 < found[-1]["corrected"] < found[-1]["observed"]
 
 
 @pytest.mark.parametrize(
