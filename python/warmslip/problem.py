@@ -151,7 +151,7 @@ def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched
     return tried
 
 
-def _refuse_types(scene: Any, loads: Any, laws: Any) -> None:
+def refuse_types(scene: Any, loads: Any, laws: Any) -> None:
     """Raises TypeError, in a sentence, for what is easily given in the place of a scene, of loads or of laws."""
     if not isinstance(scene, Scene):
         cure = (
@@ -182,7 +182,7 @@ def discretise(
     """
     from mpi4py import MPI
 
-    _refuse_types(scene, loads, laws)
+    refuse_types(scene, loads, laws)
     comm = MPI.COMM_WORLD if comm is None else comm
     d = scene.mesh.dim
     given_loads = loads is not None
