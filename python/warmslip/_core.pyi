@@ -1016,7 +1016,10 @@ class Cost:
     """
     What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
     """
-    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'steps', 'refinements', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'books_seconds', 'steps', 'refinements', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    @property
+    def books_seconds(self) -> float:
+        ...
     @property
     def contact_seconds(self) -> float:
         ...

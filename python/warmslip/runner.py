@@ -14,7 +14,7 @@ from warmslip import _core, checkpoint, mesh_io, summary
 from warmslip.interruption import Interruption
 from warmslip.laws import Law
 from warmslip.loads import Loads
-from warmslip.problem import Discretisation, discretise
+from warmslip.problem import Discretisation, discretise, refuse_types
 from warmslip.scene import Scene
 from warmslip.state import State
 from warmslip.trajectory import TrajectoryWriter
@@ -174,8 +174,12 @@ def run(
     right, contact_not_converged, not_finite, data_not_finite (a load, a gap), law_failed (a law of one's own), identity_violated,
     precision_lost, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or
     SIGTERM, which leave a checkpoint.
-    Raises ValueError for a scene, loads or laws that make no sense, OSError when `out` cannot be written.
+    Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
+    cannot be written.
     """
+    refuse_types(scene, loads, laws)  # before anything in the folder is removed
+    if callable(observers):
+        raise TypeError("observers: one function is given; give a list, [function]")
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,7 @@ from warmslip.scene import build
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 LEDGER = tuple(_core.Ledger.terms)
 CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
+THE_FILE = "give the trajectory.h5 that `warmslip run` wrote"
 DENSEST = 1000  # bytes from a byte of a file that somebody compressed
 # held back before it is written: bytes, seconds
 LARGEST, LONGEST = 2**25, 1.0
@@ -233,19 +234,26 @@ class Trajectory:
     def __init__(self, path: str | Path) -> None:
         """Raises OSError when the file cannot be opened, ValueError when it is no trajectory or a damaged one."""
         self.path = Path(path)
+        if not self.path.is_file():
+            inside = self.path / "trajectory.h5"
+            cure = f"give '{inside}'" if inside.is_file() else THE_FILE
+            raise FileNotFoundError(f"'{path}' is no file; {cure}")
         try:
-            self._file = h5py.File(self.path, "r")
-        except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
-            self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
+            try:
+                self._file = h5py.File(self.path, "r")
+            except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
+                self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
+        except OSError as error:
+            if error.errno is not None:  # of the system: rights, a disk
+                raise
+            raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
         try:
             self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
             _check(self._file)
             self._steps, self._states = self._whole()
         except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
             self._file.close()
-            raise ValueError(
-                f"'{path}' is damaged or no trajectory ({error}); give the trajectory.h5 that `warmslip run` wrote"
-            ) from None
+            raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
 
     def _whole(self) -> tuple[int, int]:
         """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
@@ -257,20 +265,27 @@ class Trajectory:
         last = file["steps/time"][steps - 1] if steps else 0.0
         return steps, int(np.sum(np.asarray(file["states/time"][:states]) <= last * (1 + 1e-12)))
 
+    @property
+    def _read(self) -> h5py.File:
+        """The file while it is open. Raises ValueError afterwards, when HDF5 itself would find that there are no fields."""
+        if not self._file:
+            raise ValueError(f"{self.path} is closed; read it inside its `with` block, or open it again")
+        return self._file
+
     def _state(self, name: str) -> Any:
         """A field of the whole states: the dataset itself if it has no others."""
-        data = self._file.get(f"states/{name}")
+        data = self._read.get(f"states/{name}")
         return data if data is None or len(data) == self._states else data[: self._states]
 
     @property
     def nodes(self) -> Array:
         """Positions, (nodes, d)."""
-        return np.asarray(self._file["mesh/nodes"])
+        return np.asarray(self._read["mesh/nodes"])
 
     @property
     def cells(self) -> Any:
         """Nodes of every cell, (cells, d+1)."""
-        return np.asarray(self._file["mesh/cells"])
+        return np.asarray(self._read["mesh/cells"])
 
     @property
     def time(self) -> Array:
@@ -296,7 +311,7 @@ class Trajectory:
         """`force`, `displacement`, `status` or `gap` of the contact points in a step, counted from 0. Raises IndexError."""
         if not -self._steps <= step < self._steps:
             raise IndexError(f"there are {self._steps} steps, and none with the number {step}")
-        return self._file[f"contact/{name}"][step % self._steps]
+        return self._read[f"contact/{name}"][step % self._steps]
 
     def discretisation(self) -> Discretisation:
         """The scene assembled again on this process, with the loads and laws that it states.
@@ -306,7 +321,7 @@ class Trajectory:
         from mpi4py import MPI
 
         scene = build(self.scene)
-        if scene.mesh.file is not None and scene.digest() != self._file.attrs.get("digest"):
+        if scene.mesh.file is not None and scene.digest() != self._read.attrs.get("digest"):
             raise ValueError(
                 f"{self.path}: mesh file '{scene.mesh.file}' has changed since the run; put it back as it was"
             )
@@ -318,13 +333,13 @@ class Trajectory:
     @property
     def functions(self) -> list[str]:
         """What Python functions took the place of the scene's: `loads`, `laws.PART.compliance` ..."""
-        return list(json.loads(self._file.attrs.get("functions", "[]")))
+        return list(json.loads(self._read.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""
         fixed = () if group in ("steps", "ledger") else ("positions", "normals", "weights", "part")
         return {
-            name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._file[group].items()
+            name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }
 
     def xarray(self) -> Any:

@@ -353,3 +353,35 @@ def test_what_load_and_export_are_given(small: Small, tmp_path: Path) -> None:
         export(tmp_path, tmp_path / "series", fields="pressure")
     with pytest.raises(TypeError, match=re.escape("times: 0.5 is no list; write [0.5]")):
         export(tmp_path, tmp_path / "series", times=0.5)  # type: ignore[arg-type]
+
+
+def test_a_file_that_is_no_trajectory(small: Small, tmp_path: Path) -> None:
+    warmslip.run(small(time__steps=1), out=tmp_path / "run")
+    with pytest.raises(
+        FileNotFoundError, match=r"nowhere.h5' is no file; give the trajectory.h5 that `warmslip run` wrote"
+    ):
+        warmslip.Trajectory(tmp_path / "nowhere.h5")
+    with pytest.raises(FileNotFoundError, match=r"run' is no file; give '.*run/trajectory.h5'"):
+        warmslip.Trajectory(tmp_path / "run")
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with pytest.raises(ValueError, match="is damaged or no trajectory"):
+        warmslip.Trajectory(tmp_path / "text.h5")
+    stored = warmslip.Trajectory(tmp_path / "run/trajectory.h5")
+    stored.close()
+    for read in (
+        lambda: stored.u,
+        lambda: stored.time,
+        lambda: stored.series("steps"),
+        lambda: stored.contact("gap", 0),
+    ):
+        with pytest.raises(ValueError, match="is closed; read it inside its `with` block"):
+            read()
+
+
+def test_a_call_of_another_kind_leaves_an_earlier_run_as_it_is(small: Small, tmp_path: Path) -> None:
+    warmslip.run(small(time__steps=1), out=tmp_path)
+    with pytest.raises(TypeError, match=r"read it with warmslip\.load"):
+        warmslip.run("scene.toml", out=tmp_path)  # type: ignore[arg-type]
+    assert (tmp_path / "summary.json").exists()
+    with pytest.raises(TypeError, match="observers: one function is given"):
+        warmslip.run(small(), observers=lambda state, report: None)  # type: ignore[arg-type]
