@@ -15,9 +15,9 @@ import numpy as np
 from warmslip import checkpoint
 from warmslip.explain import Plan, plan
 from warmslip.materials import cell_regions
+from warmslip.recorder import TrajectoryWriter
 from warmslip.runner import Run, finish, run
 from warmslip.scene import Scene, library, load
-from warmslip.trajectory import TrajectoryWriter
 
 FEW, MANY, LONG_ENOUGH = 5, 60, 0.3  # trial steps at least, and at most when they are quick; seconds
 

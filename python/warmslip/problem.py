@@ -12,7 +12,8 @@ import numpy as np
 from warmslip import _core
 from warmslip.expressions import told
 from warmslip.laws import Law, Watched
-from warmslip.loads import Array, Loads, LoadVectors, data, evaluate
+from warmslip.load_vectors import LoadVectors
+from warmslip.loads import Array, Loads, data, evaluate
 from warmslip.materials import contact_part, make_mesh, materials, of_dim
 from warmslip.scene import FullScene, Scene
 

@@ -15,9 +15,9 @@ from warmslip.interruption import Interruption
 from warmslip.laws import Law
 from warmslip.loads import Loads
 from warmslip.problem import Discretisation, discretise, refuse_types
+from warmslip.recorder import TrajectoryWriter
 from warmslip.scene import Scene
 from warmslip.state import State
-from warmslip.trajectory import TrajectoryWriter
 
 Observer = Callable[[State, Any], None]
 log = logging.getLogger(__name__)

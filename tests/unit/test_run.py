@@ -14,7 +14,7 @@ import pytest
 import warmslip
 from warmslip import Loads, Run, Scene, Trajectory, _core, runner
 from warmslip.problem import discretise
-from warmslip.trajectory import LEDGER
+from warmslip.recorder import LEDGER
 
 MakeScene = Callable[..., Scene]
 FIELDS = ("u", "w", "theta")
