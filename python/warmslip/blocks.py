@@ -146,6 +146,15 @@ def spread(name: str, ratio: Array) -> dict[str, float]:
     }
 
 
+def ratios(step: Array, whole_model: Array, contact: Array, balances: Array, least: Array) -> dict[str, float]:
+    """What the table compares, from seconds of steps that were taken beside each other: medians and quartiles."""
+    return (
+        spread("over_whole_model", step / whole_model)
+        | spread("over_least", (step - contact - balances) / least)
+        | spread("over_floor", step / (least + contact))
+    )
+
+
 def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     """One line of the table; seconds are medians a step, CPU of one process, ratios those of calls after each other.
 
@@ -157,7 +166,7 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     product = PETSc.Log.Event("MatMult")
     job, model = Run(scene(full, chosen)), Run(full)
     one, whole_model, floor = March(job), March(model), Floor(job)
-    times: dict[str, list[float]] = {"step": [], "least": [], "whole": []}
+    times: dict[str, list[float]] = {"step": [], "least": [], "whole_model": []}
     products = 0
     for n in range(full.time.steps):
         before = product.getPerfInfo()["count"]
@@ -165,27 +174,15 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
         products += product.getPerfInfo()["count"] - before
         times["least"].append(timed(floor.step))
         if n % TURN == TURN - 1:  # both see the same machine
-            times["whole"] += [timed(whole_model.step) for _ in range(TURN)]
-    steps, least, whole_steps, contact, books = (
-        settled(seconds) for seconds in (times["step"], times["least"], times["whole"], one.contact, one.books)
-    )
+            times["whole_model"] += [timed(whole_model.step) for _ in range(TURN)]
+    times |= {"contact": one.contact, "balances": one.books}
+    seconds = {name: settled(found) for name, found in times.items()}
     cost = job.stepper.cost
     return (
         chosen
         | {"bricks": full.mesh.counts[0], "unknowns": job.discretisation.unknowns}
-        | {
-            name: float(np.median(seconds))
-            for name, seconds in (
-                ("step", steps),
-                ("whole_model", whole_steps),
-                ("contact_solver", contact),
-                ("balances", books),
-                ("least", least),
-            )
-        }
-        | spread("over_whole_model", steps / whole_steps)
-        | spread("over_least", (steps - contact - books) / least)
-        | spread("over_floor", steps / (least + contact))
+        | {name: float(np.median(seconds[name])) for name in ("step", "whole_model", "contact", "balances", "least")}
+        | ratios(**seconds)
         | {
             "substitutions": cost.substitutions / cost.steps,
             "products": products / cost.steps,

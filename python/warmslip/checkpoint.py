@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
+FUNCTIONS = "set of Python functions"
 STATUSES = (0, 1, 2)  # open, stick, slip
-# where laws of the user's are asked, to be told from others: penetration; pressure and slip speed
-LENGTHS = [(1e-6,), (1e-4,), (1e-2,)]
+# where laws of the user's are asked, to be told from others: penetration over the size of the body; pressure and slip speed
+DEPTHS = (1e-8, 1e-6, 1e-4, 1e-3, 1e-2)
 PRESSURES = [(1e-3, 0.1), (1.0, 1e-3), (1.0, 1.0), (1e3, 0.1)]
 
 
@@ -40,16 +41,16 @@ def _owner(job: Run) -> dict[str, Any]:
         "code": _fingerprint(),
         "solver": job.stepper.solver,
         "ranks": job.comm.size,
-        "set of Python functions": [*job.discretisation.own, *_values(job)],
+        FUNCTIONS: [*job.discretisation.own, *_values(job, job.scene.step, job.scene.time.end)],
     }
 
 
-def _values(job: Run) -> list[str]:
-    """A hash of what Python functions in the place of the scene's give at two times and some places, if there are any."""
+def _values(job: Run, *times: float) -> list[str]:
+    """A hash of what Python functions in the place of the scene's give at some times and places, if any (collective)."""
     if not job.discretisation.own:
         return []
     found = hashlib.sha256()
-    for time in (job.scene.step, job.scene.time.end):
+    for time in times:
         try:
             given = job.discretisation.load_vectors.at(time, job.scene.step)
         except ValueError as error:  # on every rank
@@ -57,10 +58,12 @@ def _values(job: Run) -> list[str]:
             continue
         for one in given:
             found.update(np.asarray(getattr(one, "array", one if one is not None else ())).tobytes())
+    size = float(np.ptp(np.asarray(job.discretisation.mesh.nodes), axis=0).max())
     for law in job.discretisation.laws:
-        for watch, places in ((law.compliance, LENGTHS), (law.friction, PRESSURES)):
-            if watch is not None:
-                found.update(np.array([watch(*place) for place in places]).tobytes())
+        for watch in law.functions:
+            asked = watch.anew()
+            places = [(size * r,) for r in DEPTHS] if watch is law.compliance else PRESSURES
+            found.update(np.array([asked(*place) for place in places]).tobytes())
     return ["".join(job.comm.allgather(found.hexdigest()))]
 
 
@@ -69,12 +72,13 @@ def save(folder: Path, job: Run) -> None:
     stepper = job.stepper
     stepper.forget()
     fields = {name: job.discretisation.field(getattr(stepper, name)) for name in FIELDS}
-    owner = _owner(job)
+    owner, following = _owner(job), _values(job, (job.taken + 1) * job.scene.step)
     if job.comm.rank != 0:
         return
     record = {
         "owner": owner,
         "step": job.taken,
+        "next": following,
         "time": float(stepper.time).hex(),
         "worst": job.worst,
         "floors": job.floors,
@@ -181,6 +185,10 @@ def load(folder: Path, job: Run) -> int:
             raise ValueError(f"{foreign}; run it as it was, or without --resume from the start")
         return 0
     record, arrays = found
+    if record.get("next") != _values(job, (record["step"] + 1) * job.scene.step):
+        raise ValueError(
+            f"checkpoint.npz is of another {FUNCTIONS}; run it as it was, or without --resume from the start"
+        )
     nodes = len(job.discretisation.mesh.nodes)
     u, w, theta = (arrays.get(name, np.zeros((nodes, 1))) for name in FIELDS)
     job.discretisation.state(job.stepper, u, w, theta, float.fromhex(record["time"]))

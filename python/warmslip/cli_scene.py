@@ -40,8 +40,11 @@ def run(
     from mpi4py import MPI
 
     import warmslip
+    from warmslip import explain as plans
 
     rank = MPI.COMM_WORLD.rank
+    for odd in plans.plan(checked).suspicious if rank == 0 else ():
+        console.print(f"note: {odd}", highlight=False, soft_wrap=True, markup=False)
     with progress_bar(rank) as bar:
         task = bar.add_task("stepping", total=checked.time.steps, note="")
 
@@ -144,7 +147,10 @@ def explain(
 
         found = estimate.measured(checked)
     else:
+        from warmslip.materials import cell_regions, make_mesh
+
         found = plans.plan(checked)
+        cell_regions(checked, make_mesh(checked))  # what else a run would refuse
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plans.text(found))
 

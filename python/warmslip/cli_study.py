@@ -47,6 +47,9 @@ def study(
     ] = "16,32,64,128",
     reference: Annotated[int, typer.Option(help="bricks and steps of the solution taken as exact")] = 256,
     grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
+    pace: Annotated[
+        int | None, typer.Option(help="steps of level 1; default 1, for a mesh from a file the scene's time.steps")
+    ] = None,
     set_: Set = None,
 ) -> None:
     """Measure an h,k refinement study against its finest solution."""
@@ -65,9 +68,10 @@ def study(
             levels=sizes,
             reference=reference,
             grid=grid,
+            pace=pace,
             progress=lambda n, total: bar.update(task, completed=n, total=total),
         )
-    studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid))
+    studies.write(out, rows, studies.stamp(checked, levels=levels, reference=reference, grid=grid, pace=pace))
 
 
 def manufactured(
@@ -147,7 +151,10 @@ def rates(tables: Tables, out: Csv) -> None:
 
 
 def _scene_of(path: Path) -> dict[str, Any]:
-    return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
+    try:
+        return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
+    except (FileNotFoundError, ValueError, LookupError, TypeError) as error:
+        raise ValueError(f"'{path}' is no table of `warmslip study` with its stamp beside it; give one") from error
 
 
 def readings(tables: Tables, out: Csv) -> None:

@@ -67,6 +67,19 @@ def trial(job: Run, folder: Path) -> Trial:
     return found
 
 
+def _bent(job: Run) -> list[str]:
+    """Contact parts that are not flat at some nodes, as a sentence."""
+    points = np.asarray(job.discretisation.surface.positions)
+    nodal = all(contact.points == 0 for contact in job.scene.contacts)
+    there = len(np.unique(points, axis=0))
+    if not nodal or there == len(points):
+        return []
+    return [
+        f"{len(points)} contact points at {there} nodes: around {len(points) - there} of them the facets differ in normal, and "
+        "each has a point of its own; slide much less than a facet there"
+    ]
+
+
 def measured(scene: Scene, *, comm: Any = None) -> Plan:
     """The plan with what it costs here: set-up and ending as they are, the trial steps times the number of steps (collective).
 
@@ -93,6 +106,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
     return replace(
         found,
+        suspicious=[*found.suspicious, *_bent(job)],
         fields=[*found.fields, size, *regions],
         solver=job.stepper.solver,
         setup_seconds=setup,

@@ -51,6 +51,8 @@ def decimal_comma(text: str) -> str:
     bare, before = "" if text.startswith("[") else text, ""
     while bare != before:
         bare, before = re.sub(r"\([^()]*\)", "", bare), bare
+    if "(" in bare:  # an argument that nobody closed
+        return ""
     found = re.search(rf"(?<![\w.,]){NUMBER}", bare) or re.search(r"(?<![\w.])([-+]?\d+),(0\d+)", text)
     return f"write {found[1]}.{found[2]} with a point" if found else ""
 

@@ -14,8 +14,10 @@ from warmslip.loads import Array
 
 AGREEING = 0.9  # share of the samples whose derivative must be the difference quotient: a law may have kinks
 NEAR = 1e-3  # how close the two must be, relative
-EXACT = 1e-9  # relative, of an energy against its pressure: an energy found by quadrature may be so far off
-CANCELLED = 1e-12  # relative to the largest met: a formula may lose the digits of small values
+EXACT = 1e-6  # relative, of an energy against its pressure: an energy found by quadrature may be so far off
+CANCELLED = 1e-12  # relative to the largest of the trial: a formula may lose the digits of small values
+OFF = 0.97531  # from round numbers, where kinks are: factor of the places of the trial
+DEEPEST = 1e-2  # penetration of the trial, over the size of the body
 APART = 1.02  # ratio of the penetrations that are remembered
 
 Triple = tuple[float, float, float]
@@ -57,40 +59,52 @@ class Law:
 
         Raises ValueError with the place where a function is not what it should be.
         """
-        watched = Watched.of(part, self)
-        pressures = np.geomspace(1e-6, 1e2, 9)
+        watched = Watched.of(part, self, length)
+        pressures = OFF * np.geomspace(1e-6, 1e2, 9)
         if watched.compliance is not None:
-            r = np.geomspace(1e-8, 1e-2, 61) * length
+            r = OFF * np.geomspace(1e-8, DEEPEST, 61) * length
             pressures = np.array([watched.compliance.tried(float(one))[0] for one in r])[::8]
             _derives(watched.compliance, r[:, None], axis=0)
         if watched.friction is not None:
             for p in (0.0, *pressures):
                 watched.friction.tried(float(p), 0.0)
-            places = [(p, speed) for p in pressures if p > 0 for speed in np.geomspace(1e-3, 10, 9)]
+            places = [(p, speed) for p in pressures if p > 0 for speed in OFF * np.geomspace(1e-3, 10, 9)]
             for axis in (0, 1) if places else ():
                 _derives(watched.friction, np.array(places), axis=axis)
         return watched
 
 
 class Watch:
-    """A function of a law as the core calls it: what it gives is tried each time, and what cannot be becomes nan.
+    """A function of a law as the core calls it: what it gives is tried each time, and what cannot be becomes `nothing`.
 
-    The step that meets a nan fails, on all ranks alike; `wrong` then has the first reason since it was last set to None.
+    A step whose answer lies there fails, on all ranks alike; an iterate that went too far is led back by the safeguards of the
+    contact solver. `wrong` has the reason for the least place since `forget`.
     """
 
-    def __init__(self, name: str, function: Callable[..., Sequence[float]]) -> None:
-        self.name, self._function = name, function
+    nothing: Triple = (math.nan, math.nan, math.nan)
+
+    def __init__(self, name: str, function: Callable[..., Sequence[float]], length: float) -> None:
+        self.name, self._function, self._length = name, function, length
+        self.forget()
+
+    def forget(self) -> None:
+        """Before a step: what went wrong in iterates of the last one is of no consequence."""
         self.wrong: str | None = None
+        self._least = math.inf
+
+    def anew(self) -> Watch:
+        """The same function, of which nothing is known yet."""
+        return type(self)(self.name, self._function, self._length)
 
     def __call__(self, *place: float) -> Triple:
-        nothing = (math.nan, math.nan, math.nan)
         if not all(map(math.isfinite, place)):  # the step has failed before
-            return nothing
+            return self.nothing
         try:
             return self.tried(*place)
         except ValueError as error:
-            self.wrong = self.wrong or str(error)
-            return nothing
+            if place[0] < self._least:
+                self.wrong, self._least = str(error), place[0]
+            return self.nothing
 
     def tried(self, *place: float) -> Triple:
         """The three values. Raises ValueError with the place for what is no value of a law."""
@@ -109,15 +123,23 @@ class Watch:
 class Pressing(Watch):
     """A compliance, which must also agree with itself: between two penetrations the energy grows by the pressure."""
 
-    def __init__(self, name: str, function: Callable[..., Sequence[float]]) -> None:
-        super().__init__(name, function)
+    nothing = (math.inf, math.inf, math.inf)  # whatever comes there is pressed back
+
+    def __init__(self, name: str, function: Callable[..., Sequence[float]], length: float) -> None:
+        super().__init__(name, function, length)
         self._met = [(0.0, 0.0, 0.0)]  # penetration, pressure, energy: ascending, at least a ratio APART
-        self._most = 0.0, 0.0  # pressure and energy
+        self._most = 0.0, 0.0  # pressure and energy of the trial
+
+    @property
+    def too_far(self) -> bool:
+        """Whether it was asked in vain for penetrations larger than the body alone."""
+        return self._length < self._least < math.inf
 
     def tried(self, *place: float) -> Triple:
         (r,) = place
         pressure, slope, energy = super().tried(r)
-        self._most = max(self._most[0], pressure), max(self._most[1], energy)
+        if r <= DEEPEST * self._length:
+            self._most = max(self._most[0], pressure), max(self._most[1], energy)
         here, at = (r, pressure, energy), bisect.bisect(self._met, (r,))
         under, over = self._met[at - 1], self._met[at : at + 1]
         pairs = [(under, here), *((here, one) for one in over)]
@@ -146,8 +168,8 @@ class Pressing(Watch):
         off = EXACT * energy_next + CANCELLED * self._most[1]
         if not low - off <= grown <= high + off:
             raise ValueError(
-                f"{self.name}: from r = {r:.3g} to {r_next:.3g} the energy grows by {grown:.6g} and the pressure gives "
-                f"{low:.6g} to {high:.6g}; the third value is the integral of the first"
+                f"{self.name}: from r = {r:.6g} to {r_next:.6g} the energy grows by {grown:.9g} and the pressure gives "
+                f"{low:.9g} to {high:.9g}; the third value is the integral of the first"
             )
 
 
@@ -159,22 +181,22 @@ class Watched:
     friction: Watch | None = None
 
     @classmethod
-    def of(cls, part: str, law: Law) -> Watched:
-        """The functions of the law of a contact part, of which nothing is known yet."""
+    def of(cls, part: str, law: Law, length: float) -> Watched:
+        """The functions of the law of a contact part of a body of size `length`, of which nothing is known yet."""
         return cls(
-            law.compliance and Pressing(f"laws.{part}.compliance", law.compliance),
-            law.friction and Watch(f"laws.{part}.friction", law.friction),
+            law.compliance and Pressing(f"laws.{part}.compliance", law.compliance, length),
+            law.friction and Watch(f"laws.{part}.friction", law.friction, length),
         )
 
-    def forget(self) -> None:
-        """Before a step: what went wrong in iterates of the last one is of no consequence."""
-        for watch in filter(None, (self.compliance, self.friction)):
-            watch.wrong = None
+    @property
+    def functions(self) -> list[Watch]:
+        return [one for one in (self.compliance, self.friction) if one is not None]
 
     @property
     def wrong(self) -> str | None:
-        """Why the step failed, if it was for one of the functions."""
-        return next((w.wrong for w in (self.compliance, self.friction) if w is not None and w.wrong), None)
+        """Why the step failed, if it was for one of the functions: a penetration beyond the body is only an iterate's."""
+        far = self.compliance is not None and self.compliance.too_far
+        return next((one.wrong for one in self.functions if one.wrong and not far), None)
 
 
 def _derives(law: Watch, places: Array, *, axis: int) -> None:

@@ -14,7 +14,18 @@ from warmslip.scene import Scene
 
 
 def _refuse_unused(scene: Scene, loads: Loads) -> None:
-    """Raises ValueError for data that no support or contact part of the scene would take."""
+    """Raises ValueError for data that no field, support or contact part of the scene would take."""
+    touches = any(contact.stiffness is not None for contact in scene.contacts)
+    for names, there, table in (
+        (("source", "heat_flux", "contact_flux", "foundation_temperature"), scene.heat is not None, "[heat]"),
+        (("body", "traction", "contact_traction"), scene.moves, "[elasticity], [viscosity] or [inertia]"),
+        (("gap",), touches, "[contact] with a stiffness"),
+    ):
+        for name in names:
+            if not there and _acts(getattr(loads, name)):
+                raise ValueError(
+                    f"loads.{name}: the scene has no {table}, nothing would take it; add the table or leave it out"
+                )
     for name in SUPPORTS:
         held = getattr(scene.supports, name)
         for part in getattr(loads, name):
@@ -198,6 +209,13 @@ class LoadVectors:
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
         velocity, temperature = self._support_velocity(t, step), self._support_temperature(t)
         return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation)
+
+
+def _acts(data: Any) -> bool:
+    """Whether a datum, or one of several, is a function or not zero."""
+    if isinstance(data, dict | list | tuple):
+        return any(_acts(one) for one in (data.values() if isinstance(data, dict) else data))
+    return callable(data) or bool(np.any(np.asarray(data, dtype=float) != 0))
 
 
 def _times(factor: float, data: Data) -> Data:

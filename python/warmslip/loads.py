@@ -72,10 +72,16 @@ class Loads:
     points: int = 3
 
     def __post_init__(self) -> None:
-        """Raises TypeError for a load that is not by part where it should be."""
+        """Raises TypeError for a load that is not by part where it should be, and for a formula."""
         for name in ("traction", "heat_flux", "displacement", "temperature"):
             if not isinstance(value := getattr(self, name), dict):
                 raise TypeError(f"loads.{name}: {shown(value)} is no dictionary; give it by part, {{'left': ...}}")
+        for name, value in vars(self).items():
+            for one in value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]:
+                if isinstance(one, str):
+                    raise TypeError(
+                        f"loads.{name}: {shown(one)} is a text; formulas stand in the scene, give a function here"
+                    )
 
     @classmethod
     def of(cls, scene: Scene) -> Loads:
@@ -121,6 +127,8 @@ def shaped(data: Data, x: Array, t: float, components: int, what: str) -> Array:
     value = _numbers(data, x, t, what)
     if value.ndim < 2 and components == 1 and value.shape in ((), (len(x),)):
         value = np.broadcast_to(value, (len(x),))[:, None]
+    elif value.shape == () and value:  # the same number along every axis is hardly meant
+        raise ValueError(f"{what} is one number, {value:g}, where {components} are due; give one for each axis")
     elif value.shape in ((), (components,)):
         value = np.broadcast_to(value, (len(x), components))
     if value.shape != (len(x), components):
@@ -139,6 +147,8 @@ def _numbers(data: Data, x: Array, t: float, what: str) -> Array:
             raise ValueError(f"{what} at t = {t:g}: {why}") from error
         if given is None:
             raise ValueError(f"{what} at t = {t:g}: the function gave None; let it return its values")
+    if np.iscomplexobj(given):
+        raise ValueError(f"{what} at t = {t:g}: {shown(given)} is complex; give real numbers")
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):

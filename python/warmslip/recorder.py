@@ -168,6 +168,7 @@ class TrajectoryWriter:
     def __enter__(self) -> Self:
         if self._writing and self._taken == 0:
             self._state()
+            self.write()
         return self
 
     def __exit__(

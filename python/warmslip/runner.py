@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from warmslip import _core, checkpoint, mesh_io, summary
+import numpy as np
+
+from warmslip import _core, checkpoint, mesh_io, provenance, summary
 from warmslip.interruption import Interruption
 from warmslip.laws import Law
 from warmslip.loads import Loads
@@ -18,6 +20,7 @@ from warmslip.problem import Discretisation, discretise, refuse_types
 from warmslip.recorder import TrajectoryWriter
 from warmslip.scene import Scene
 from warmslip.state import State
+from warmslip.trajectory import Trajectory
 
 Observer = Callable[[State, Any], None]
 log = logging.getLogger(__name__)
@@ -117,7 +120,8 @@ class Run:
                 self.outcome, self.failure = "data_not_finite", {"step": n, "reason": str(error)}
                 return
             for law in self.discretisation.laws:
-                law.forget()
+                for function in law.functions:
+                    function.forget()
             report = self.stepper.advance(*loads)
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
@@ -165,9 +169,10 @@ def run(
 ) -> Result:
     """Runs a scene. With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs.
 
-    With `resume`, goes on from the newest whole checkpoint in `out`, to the same end bit by bit as the run that was not
-    stopped; without one it starts from the beginning. Functions in Python must be there again; they are told apart by
-    what they give at two times and a few places.
+    With `resume`, goes on from the newest whole checkpoint in `out`, to the same end as the run that was not stopped, on one
+    process bit by bit, on several to rounding. Without one it starts from the beginning, unless this very run has ended right
+    there before: that is the result then. Functions in Python must be there again; they are told apart by what they give at
+    some times and places.
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
@@ -180,6 +185,11 @@ def run(
     refuse_types(scene, loads, laws)  # before anything in the folder is removed
     if callable(observers):
         raise TypeError("observers: one function is given; give a list, [function]")
+    for observer in observers:
+        if not callable(observer):
+            raise TypeError(f"observers: {observer!r} is no function; give functions of state and report")
+    if resume and out is None:
+        raise ValueError("resume: there is no folder to go on from; give out=")
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -191,6 +201,8 @@ def run(
     begin = 0
     if resume and folder is not None:
         begin = job.resume(folder)
+        if not begin and (ended := _ended(job, folder)):
+            return ended
         _clear(folder)
     minutes, saved = scene.output.checkpoint_minutes, time.monotonic()
     with (
@@ -216,6 +228,24 @@ def run(
         for name in checkpoint.NAMES:  # the run is over
             (folder / name).unlink(missing_ok=True)
     return finish(job, folder)
+
+
+def _ended(job: Run, folder: Path) -> Result | None:
+    """The result in a folder where this very run has ended right before (collective). Functions in Python are not told apart."""
+    found: Result | None = None
+    if job.comm.rank == 0 and not job.discretisation.own:
+        try:
+            told = json.loads((folder / "summary.json").read_text())
+            stamp = told["stamp"]
+            same = (stamp["scene_hash"], stamp["fingerprint"]) == (job.scene.digest(), provenance.fingerprint())
+            if told["outcome"] == "right" and same and not told["functions"]:
+                with Trajectory(folder / "trajectory.h5") as t:
+                    u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
+                    if round(float(t.time[-1]) / job.scene.step) == job.scene.time.steps:
+                        found = Result(told, u, w, theta, folder / "trajectory.h5")
+        except (OSError, ValueError, LookupError, TypeError):
+            pass  # then it is run
+    return job.comm.bcast(found, root=0)  # type: ignore[no-any-return]
 
 
 def _clear(folder: Path, *more: str) -> None:

@@ -93,7 +93,7 @@ class Scene(t.Table):
         """
         data = self.resolved()
         for key, value in values.items():
-            _set(data, key, value)
+            _set(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
         return _build(data, type(self))
 
     def _formulas(self) -> list[tuple[str, Any]]:
@@ -239,7 +239,8 @@ def _comma(text: str, error: str) -> tuple[int, str]:
         for found in re.finditer(rf"=[ \t]*{NUMBER}|[\[,][ \t]*([-+]?\d+),(0\d+)", here := text.split("\n")[line - 1]):
             if found.start() <= column and not here[found.end() : column].strip():
                 whole, part = (found[1], found[2]) if found[1] else (found[3], found[4])
-                return line, f"write {whole}.{part} with a point"
+                several = f", or [{whole}, {part}] for two" if re.match(r"\s*(n|lengths|grading)\s*=", here) else ""
+                return line, f"write {whole}.{part} with a point{several}"
     return 0, ""
 
 
@@ -277,7 +278,8 @@ def _set(data: dict[str, Any], key: str, value: Any) -> None:
                 named = ".".join(rest[rest[0].isdecimal() or rest[0] in names :]) or "KEY"
                 raise SceneError(f"{key}: {here} has the parts 0 to {len(place) - 1}; write {here}.{number}.{named}")
         elif not isinstance(place, dict):
-            raise SceneError(f"{key}: '{here}' is a value, not a table")
+            cure = f"give the whole list, {here}=[...]" if isinstance(place, list) else "give the value itself"
+            raise SceneError(f"{key}: '{here}' is a value, not a table; {cure}")
     if value is None:
         place.pop(last, None)
     else:
@@ -335,9 +337,15 @@ def _sentence(error: Any, where: list[str]) -> str:
             return message if key == "scene" else f"{key}: {message}"
         case "model_type":
             return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where))}"
+        case "list_type":
+            return f"{key} = {given} is no list; write [{given}]"
+        case "string_pattern_mismatch" if key.endswith("quadrature"):
+            return f"{key} = {given} is unknown; use nodal, or gauss-1 to gauss-8"
         case "finite_number":
             return f"{key}: {given} is not a finite number; give one"
         case _ if isinstance(error.get("input"), str) and (cure := decimal_comma(error["input"])):
+            if where[0] == "mesh":
+                cure += f", or [{error['input']}] for two numbers"
             return f"{key} = {given}: a decimal comma; {cure}"
         case _:
             return f"{key} = {given}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import resource
 from collections.abc import Callable
 from dataclasses import replace
@@ -90,13 +91,14 @@ def study(
     levels: list[int],
     reference: int,
     grid: str = "diagonal",
+    pace: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
     """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
 
-    A level is the number of bricks along the first axis, and of steps; the other axes keep their ratio to it. For a mesh from a
-    file it is 1, 2, 4, ..: into how many pieces an edge is cut, and how many times the scene's steps are taken; h is then
-    relative to the file's. Numbers of a field that the scene does not have are 0.
+    A level is the number of bricks along the first axis, the other axes keep their ratio to it, and of steps, times `pace`. For a
+    mesh from a file it is 1, 2, 4, ..: into how many pieces an edge is cut. The pace is 1 unless it is given, for a file the
+    scene's steps. h is relative to the first side, or to the file's. Numbers of a field that the scene does not have are 0.
 
     Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
     Raises RuntimeError naming the member when a run does not end right.
@@ -105,7 +107,10 @@ def study(
         raise SceneError("mesh.refine: the levels of a study refine the file themselves; leave it out")
     if any(ratio != 1 for ratio in scene.mesh.grading or []):
         raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
-    pace = scene.time.steps if scene.mesh.file is not None else 1
+    if pace is None:
+        pace = scene.time.steps if scene.mesh.file is not None else 1
+    if pace < 1:
+        raise SceneError(f"--pace {pace} is no number of steps; give 1 or more")
     meshes: dict[int, Discretisation] = {}
 
     def job(n: int, steps: int) -> Run:
@@ -133,12 +138,16 @@ def study(
 def _mesh(scene: Scene, level: int) -> dict[str, Any]:
     """The key of the mesh of a level. Raises SceneError for a level that this mesh does not have."""
     if scene.mesh.file is not None:
-        if level & (level - 1):
-            raise SceneError(f"a mesh from a file is halved: level {level} is no power of two; give 1,2,4,..")
+        if level & (level - 1) or level > 64:
+            why = "no power of two" if level & (level - 1) else "more than 64"
+            raise SceneError(f"a mesh from a file is halved: level {level} is {why}; give --levels 1,2,4 --reference 8")
         return {"mesh.refine": level.bit_length() - 1}
     counts = scene.mesh.counts
     if any(level * count % counts[0] for count in counts):
-        raise SceneError(f"mesh.n = {counts}: level {level} cannot keep the ratio of the axes; give other levels")
+        least = counts[0] // math.gcd(*counts)
+        raise SceneError(
+            f"mesh.n = {counts}: level {level} cannot keep the ratio of the axes; give multiples of {least}"
+        )
     axes = [level * count // counts[0] for count in counts]
     return {"mesh.n": level if len(set(axes)) == 1 else axes}
 

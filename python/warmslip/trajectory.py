@@ -11,6 +11,7 @@ import numpy as np
 
 from warmslip.loads import Array
 from warmslip.problem import Discretisation, discretise
+from warmslip.recorder import LEDGER, REPORT
 from warmslip.scene import build
 
 CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
@@ -33,8 +34,8 @@ def _check(file: h5py.File) -> None:
         if points or name in file["contact"]:
             _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))
     _shape(file, "steps/time", "f", None)
-    for group in ("steps", "ledger"):
-        for name in file[group]:
+    for group, names in (("steps", REPORT), ("ledger", LEDGER)):
+        for name in {*file[group], *names}:
             _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
 
 
@@ -65,9 +66,9 @@ class Trajectory:
             raise FileNotFoundError(f"'{path}' is no file; {cure}")
         try:
             try:
-                self._file = h5py.File(self.path, "r")
+                self._file = h5py.File(self.path, "r", locking=False)  # or a run could not close what somebody reads
             except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
-                self._file = h5py.File(self.path, "r", libver="latest", swmr=True)
+                self._file = h5py.File(self.path, "r", libver="latest", swmr=True, locking=False)
         except OSError as error:
             if error.errno is not None:  # of the system: rights, a disk
                 raise
@@ -76,6 +77,8 @@ class Trajectory:
             self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
             _check(self._file)
             self._steps, self._states = self._whole()
+            if not self._states:
+                raise ValueError("there is no whole state in it yet")
         except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
             self._file.close()
             raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None

@@ -78,8 +78,25 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
         assert (row["unknowns"], row["substitutions"], row["refinements"]) == (75, 2, 0)
         assert row["products"] == len(expected(row))
         assert 0 < row["least"] < row["step"] < 10 * row["whole_model"]
-        assert row["contact_solver"] > 0 and row["balances"] > 0
+        assert row["contact"] > 0 and row["balances"] > 0
         for name in ("over_whole_model", "over_least", "over_floor"):
             assert 0 < row[f"{name}_lower"] <= row[name] <= row[f"{name}_upper"]
     wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
     assert wrong.returncode == 2 and "no multiple of 5" in wrong.stderr
+
+
+def test_the_ratios_are_those_of_the_seconds_given() -> None:
+    """A step of 10 with 2 in contact and 3 in its books, least code of 4, a whole model of 20; one disturbed step in five."""
+    calm = {"step": 10.0, "whole_model": 20.0, "contact": 2.0, "balances": 3.0, "least": 4.0}
+    seconds = {name: np.full(40, value) for name, value in calm.items()}
+    seconds["step"][::5] = 1000
+    seconds["step"][:5] = 7777  # the first turn
+    settled = {name: blocks.settled(list(values)) for name, values in seconds.items()}
+    assert {len(values) for values in settled.values()} == {28}
+    found = blocks.ratios(**settled)
+    for name, value in (("over_whole_model", 0.5), ("over_least", 1.25), ("over_floor", 10 / 6)):
+        assert [found[name + end] for end in ("_lower", "", "_upper")] == pytest.approx([value] * 3)
+    rising = blocks.ratios(**settled | {"step": np.linspace(10, 14, 28)})
+    assert rising["over_whole_model_lower"] == pytest.approx(0.55) and rising[
+        "over_whole_model_upper"
+    ] == pytest.approx(0.65)

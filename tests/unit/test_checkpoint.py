@@ -147,7 +147,14 @@ def killed(folder: Path, after: float | None) -> bool:
     words = [word for key in LONG for word in ("--set", key)]
     program = str(Path(sys.executable).parent / "warmslip")
     newest = folder / checkpoint.NAMES[0]
-    begin = newest.stat().st_mtime_ns if newest.exists() else 0
+
+    def written() -> int:
+        try:
+            return newest.stat().st_mtime_ns
+        except FileNotFoundError:  # none yet, or being replaced
+            return 0
+
+    begin = written()
     process = subprocess.Popen(
         [program, "run", "paper_mixed", *words, "--out", str(folder), "--resume"],
         env=child_environment(),
@@ -155,7 +162,7 @@ def killed(folder: Path, after: float | None) -> bool:
         stderr=subprocess.PIPE,
     )
     while after is not None and process.poll() is None:
-        if newest.exists() and newest.stat().st_mtime_ns > begin:  # so that every process brings the run on
+        if written() > begin:  # so that every process brings the run on
             readable(folder / "trajectory.h5")  # while it is being written
             time.sleep(after)
             process.send_signal(signal.SIGKILL)
@@ -279,9 +286,83 @@ def test_a_run_with_loads_is_not_resumed_with_others(tmp_path: Path) -> None:
     assert warmslip.run(scene(), out=tmp_path, loads=loads(0.0), resume=True).summary["steps"] == 24
 
 
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (
+            warmslip.Law(compliance=lambda r: (10 * r, 10.0, 5 * r**2)),
+            warmslip.Law(compliance=lambda r: (10.01 * r, 10.01, 5.005 * r**2)),
+        ),
+        (
+            warmslip.Law(friction=lambda p, s: (0.1 * p, 0.1, 0.0)),
+            warmslip.Law(friction=lambda p, s: (0.1 * p * (1 + 1e-3 * s), 0.1 * (1 + 1e-3 * s), 1e-4 * p)),
+        ),
+    ],
+    ids=["pressure", "speed"],
+)
+def test_a_run_with_a_law_is_not_resumed_with_another(tmp_path: Path, one: Any, other: Any) -> None:
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, laws={"bottom": one}, progress=stop_after(7))
+    with pytest.raises(ValueError, match="is of another set of Python functions"):
+        warmslip.run(scene(), out=tmp_path, laws={"bottom": other}, resume=True)
+    assert warmslip.run(scene(), out=tmp_path, laws={"bottom": one}, resume=True).right
+
+
+def test_a_run_whose_load_differs_at_the_next_step_is_not_resumed(tmp_path: Path) -> None:
+    """A push that acts neither in the first step nor at the end."""
+
+    def loads(push: float) -> warmslip.Loads:
+        body = lambda x, t: np.tile([0.0, -1.0 - push * (0.1 < t / scene().time.end < 0.8)], (len(x), 1))  # noqa: E731
+        return replace(warmslip.Loads.of(scene()), body=body)
+
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, loads=loads(0.5), progress=stop_after(7))
+    with pytest.raises(ValueError, match="is of another set of Python functions"):
+        warmslip.run(scene(), out=tmp_path, loads=loads(5.0), resume=True)
+    assert warmslip.run(scene(), out=tmp_path, loads=loads(0.5), resume=True).right
+
+
+def test_a_trajectory_without_a_state_is_refused(tmp_path: Path) -> None:
+    warmslip.run(scene(), out=tmp_path)
+    with h5py.File(tmp_path / "trajectory.h5", "r+") as file:
+        file["states/u"].resize(0, axis=0)
+    with pytest.raises(ValueError, match="there is no whole state in it yet"):
+        warmslip.Trajectory(tmp_path / "trajectory.h5")
+    with h5py.File(tmp_path / "trajectory.h5", "r+") as file:
+        del file["steps/slip"]
+    with pytest.raises(ValueError, match="steps/slip is missing"):
+        warmslip.Trajectory(tmp_path / "trajectory.h5")
+
+
 def test_the_end_of_another_scene_is_not_overwritten(tmp_path: Path) -> None:
     warmslip.run(scene(), out=tmp_path)
     with pytest.raises(ValueError, match=r"summary.json is of another scene; run it as it was"):
         warmslip.run(scene("contact.stiffness=20.0"), out=tmp_path, resume=True)
     assert json.loads((tmp_path / "summary.json").read_text())["stamp"]["scene_hash"] == scene().digest()
     assert warmslip.run(scene(), out=tmp_path, resume=True).right
+
+
+def test_a_run_that_has_ended_right_is_not_computed_again(tmp_path: Path) -> None:
+    taken: list[int] = []
+
+    def again(one: Scene, **more: Any) -> Any:
+        taken.clear()
+        return warmslip.run(one, out=tmp_path, resume=True, progress=lambda step, *_: taken.append(step), **more)
+
+    first = again(scene())
+    assert len(taken) == 24
+    written = (tmp_path / "trajectory.h5").stat().st_mtime_ns
+    second = again(scene())
+    assert not taken and (tmp_path / "trajectory.h5").stat().st_mtime_ns == written
+    assert second.right and second.summary == json.loads(json.dumps(first.summary))
+    assert all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("u", "w", "theta"))
+    law = {"bottom": warmslip.Law(friction=lambda p, s: (0.1 * p, 0.1, 0.0))}
+    again(scene(), laws=law)  # a law is not told from another by its end
+    assert len(taken) == 24
+    again(scene())
+    assert len(taken) == 24
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary["stamp"]["fingerprint"] = "of other code"
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    again(scene())
+    assert len(taken) == 24

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -124,7 +125,7 @@ def test_a_study_is_refused_before_it_is_computed(command: Command, tmp_path: Pa
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["rates", "table.csv", "--out", "rates.csv"], "not tables that `warmslip study` wrote"),
+        (["rates", "table.csv", "--out", "rates.csv"], "is no table of `warmslip study` with its stamp"),
         (["draw", "errors", "table.csv", "--out", "a.png"], "'errors' is drawn from studies named"),
         (["draw", "errors", "mixed_0_staggered.csv", "--out", "a.png"], "will not do"),
         (["draw", "figure_9", "table.csv", "--out", "a.png"], "unknown figure 'figure_9'; give one of setting"),
@@ -138,3 +139,31 @@ def test_tables_of_another_kind_are_refused(command: Command, tmp_path: Path, ar
     assert result.returncode == 2
     assert words in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_study_of_ones_own(command: Command, tmp_path: Path) -> None:
+    """Its steps keep pace with the scene, its errors can be drawn, and what is no study is named."""
+    call = "study elastic_drop --levels 2,4 --reference 8 --pace 5 --out own.csv"
+    done = command(*call.split())
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "own.csv").open()))
+    assert [(row["n"], row["steps"]) for row in rows] == [("2", "10"), ("4", "20"), ("8", "40")]
+    drawn = command("draw", "study", "own.csv", "--out", "own.png")
+    assert drawn.returncode == 0, drawn.stderr
+    said = (tmp_path / "own.rst").read_text()
+    first, last = (float(rows[i]["e_u_V"]) for i in (0, 1))
+    assert f"u_V {first:.3g} to {last:.3g}" in " ".join(said.split()) and "theta" not in said
+    refused = command("draw", "errors", "own.csv", "--out", "own.png")
+    assert refused.returncode == 2 and "`warmslip draw study` draws any study" in refused.stderr
+    nothing = command("rates", "nope.csv", "--out", "rates.csv")
+    assert nothing.returncode == 2 and "'nope.csv' is no table of `warmslip study`" in nothing.stderr
+    slow = command(*call.replace("--pace 5", "--pace 0").split())
+    assert slow.returncode == 2 and "--pace 0 is no number of steps" in slow.stderr
+
+
+def test_what_is_odd_is_said_before_a_run(command: Command) -> None:
+    small = [word for key in ("mesh.n=4", "time.steps=2") for word in ("--set", key)]
+    done = command("run", "paper_mixed", *small, "--set", "contact.gap=-0.01")
+    assert done.returncode == 0 and "note: the gap of 'bottom' is negative" in done.stderr
+    dry = command("run", "two_materials", "--dry-run", "--set", "regions.insert.where=x > 9")
+    assert dry.returncode == 2 and "no cell lies in it" in dry.stderr

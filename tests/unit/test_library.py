@@ -9,12 +9,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 from conftest import Command
 
 import warmslip
-from warmslip import estimate, explain, study
+from warmslip import estimate, explain, materials, study
 from warmslip.scene import library
 
 # one number of each, regression: norm of the last state, or what its essay promises
@@ -282,3 +283,25 @@ def test_a_plan_states_the_heat_that_contact_leads_and_makes() -> None:
     assert f"heat of friction on 'bottom', of which {share:g} goes into the body" in said
     assert (exchange.per_pressure > 0) == ("times the pressure" in explain.text(explain.plan(scene)))
     assert "times the pressure" not in explain.text(explain.plan(warmslip.load("paper_mixed")))
+
+
+def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
+    """Two sides of a square as one part: their corner has a point for each."""
+    bent = warmslip.load("quasistatic_punch").override(**{"mesh.n": 4, "time.steps": 5, "contact.part": "left"})
+    assert not any("differ in normal" in said for said in estimate.measured(bent).suspicious)
+    mesh = materials.make_mesh(bent)
+    parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
+    parts = {"top": parts["top"], "shoe": np.concatenate([parts["left"], parts["bottom"]])}
+    cells = [("triangle", np.array(mesh.cells)), ("line", np.concatenate(list(parts.values())))]
+    tags = [np.ones(len(mesh.cells), int), np.repeat([2, 3], [len(f) for f in parts.values()])]
+    meshio.Mesh(
+        np.column_stack([mesh.nodes, np.zeros(len(mesh.nodes))]),
+        cells,
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={"body": np.array([1, 2]), "top": np.array([2, 1]), "shoe": np.array([3, 1])},
+    ).write(tmp_path / "bent.msh", file_format="gmsh22")
+    file = bent.override(
+        **{"mesh.file": str(tmp_path / "bent.msh"), "mesh.n": None, "mesh.shape": None, "contact.part": "shoe"}
+    )
+    (said,) = [s for s in estimate.measured(file).suspicious if "differ in normal" in s]
+    assert said.startswith("9 contact points at 8 nodes: around 1 of them")

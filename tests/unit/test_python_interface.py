@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import Law, Scene
+from warmslip import Law, Scene, laws
 from warmslip.export import export
 
 Small = Callable[..., Scene]
@@ -385,3 +385,73 @@ def test_a_call_of_another_kind_leaves_an_earlier_run_as_it_is(small: Small, tmp
     assert (tmp_path / "summary.json").exists()
     with pytest.raises(TypeError, match="observers: one function is given"):
         warmslip.run(small(), observers=lambda state, report: None)  # type: ignore[arg-type]
+
+
+def test_what_a_load_may_not_be(small: Small) -> None:
+    loads = warmslip.Loads.of(small())
+    with pytest.raises(TypeError, match=r"loads.body: '-1' is a text; formulas stand in the scene"):
+        replace(loads, body="-1")
+    with pytest.raises(TypeError, match=r"loads.traction: 't' is a text"):
+        replace(loads, traction={"left": "t"})
+    for body in (-1.0, lambda x, t: -1.0):
+        with pytest.raises(ValueError, match=r"loads\.body is one number, -1, where 2 are due; give one for each axis"):
+            warmslip.run(small(), loads=replace(loads, body=body))
+    with pytest.raises(ValueError, match=r"(?s)loads.body at t = .* is complex; give real numbers"):
+        warmslip.run(small(), loads=replace(loads, body=lambda x, t: x * 1j))
+    with pytest.raises(TypeError, match="observers: 3 is no function"):
+        warmslip.run(small(), observers=[3])  # type: ignore[list-item]
+    with pytest.raises(ValueError, match="resume: there is no folder to go on from; give out="):
+        warmslip.run(small(), resume=True)
+
+
+@pytest.mark.parametrize(
+    ("without", "given"),
+    [
+        ("heat", {"source": 1e9}),
+        ("heat", {"heat_flux": {"top": lambda x, t: x[:, 0]}}),
+        ("motion", {"body": [0.0, -1.0]}),
+        ("contact", {"gap": lambda x, t: x[:, 0]}),
+    ],
+)
+def test_loads_that_no_field_takes_are_refused(without: str, given: dict[str, Any]) -> None:
+    scene = {
+        "heat": warmslip.load("quasistatic_punch"),
+        "motion": warmslip.load("heat_slab"),
+        "contact": warmslip.load("quasistatic_punch").override(contact=None),
+    }[without]
+    with pytest.raises(ValueError, match=rf"loads\.{next(iter(given))}: the scene has no \[.* nothing would take it"):
+        warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), **given))
+
+
+def test_kinks_on_round_numbers_and_energies_by_quadrature_are_laws(small: Small) -> None:
+    """Limits stand at 1 or 0.1, tables at powers of ten, and scipy's quad knows the integral of a bent function to 1e-8."""
+    for law in (
+        Law(friction=lambda p, s: (0.3 * min(p, 1.0), 0.3 * (p < 1), 0.0)),
+        Law(
+            friction=lambda p, s: (
+                (bent := 0.3 * min(1, 0.1 / (s + 1e-300))) and (bent * p, bent, 0.0 if s < 0.1 else -0.03 * p / s**2)
+            )
+        ),
+        Law(compliance=lambda r: (*linear(r)[:2], linear(r)[2] * (1 + 4e-8 * math.sin(1e4 * r)))),
+    ):
+        assert warmslip.run(small(contact__stiffness=STIFF), laws={"bottom": law}).right
+
+
+def test_a_law_asked_far_away_still_knows_what_falls() -> None:
+    """One huge value does not blind the watch, and what went wrong before a step is forgotten."""
+    law = Law(compliance=lambda r: (math.exp(400 * r) - 1 if r < 0.013 or r > 0.1 else 44.0, 1.0, 1.0))
+    watch = laws.Watched.of("bottom", law, 1.0).compliance
+    assert watch is not None
+    for r in (0.12, 0.0125, 0.0135):
+        watch(r)
+    assert watch.wrong is not None
+    watch.forget()
+    assert watch.wrong is None
+
+
+def test_an_overshooting_iterate_is_led_back(small: Small) -> None:
+    """Newton asks this law at penetrations where it overflows; the answer lies where it does not."""
+    stiff = Law(compliance=lambda r: (math.expm1(200 * r), 200 * math.exp(200 * r), math.expm1(200 * r) / 200 - r))
+    pushed = {"loads__body": [0.0, -20.0], "time__steps": 2, "time__end": 10.0}
+    result = warmslip.run(small(**pushed), laws={"bottom": stiff})
+    assert result.right and 1e-3 < result.summary["contact"]["max_penetration"] < 0.1

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 
@@ -128,6 +129,7 @@ def test_refuses_files(tmp_path: Path, text: str | bytes | None, words: str) -> 
     ("line", "words"),
     [
         ("stiffness = 0,5", "has a decimal comma in line 10; write 0.5 with a point"),
+        ("gap = 'max(0,1'", "contact.gap: 'max(0,1' is not a formula"),
         ("stiffness = -1,5e3 # soft", "write -1.5e3 with a point"),
         ("stiffness = 0,05", "write 0.05 with a point"),
         ("friction = { coefficient = 0,3 }", "write 0.3 with a point"),
@@ -256,3 +258,14 @@ def test_schema_forbids_what_scenes_forbid() -> None:
     tables = [schema, *schema["$defs"].values()]
     assert all(table["additionalProperties"] is False for table in tables)
     assert set(schema["required"]) <= set(load("paper_mixed").resolved())
+
+
+def test_two_numbers_need_brackets(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text("[mesh]\nn = 8,8\n")
+    with pytest.raises(SceneError, match=r"in line 2; write 8.8 with a point, or \[8, 8\] for two"):
+        load(str(tmp_path / "two.toml"))
+    with pytest.raises(SceneError, match=r"mesh.n = '8,8': .* write 8.8 with a point, or \[8,8\] for two numbers"):
+        load("paper_mixed", ["mesh.n=8,8"])
+    with pytest.raises(SceneError, match=r"give the whole list, loads.body=\[...\]"):
+        load("paper_mixed", ["loads.body.1=2"])
+    assert load("paper_mixed").override(**{"mesh.n": np.int64(4), "loads.body": np.zeros(2)}).mesh.n == 4

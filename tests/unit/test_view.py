@@ -172,3 +172,17 @@ def test_a_flat_body_has_a_flat_figure() -> None:
     figure, _ = drawings.bodies(flat, 1.0)
     assert figure.get_figheight() < 2.2 and not figure.legends
     plt.close(figure)
+
+
+def test_a_body_in_space_shows_its_contact() -> None:
+    """The camera stands where the contact points are."""
+    nodes = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+
+    def seen(points: list[list[float]]) -> tuple[float, float]:
+        at = np.array(points).reshape(-1, 3)
+        return drawings._seen_from(
+            drawings.Body(0.0, nodes, np.array([[0, 1, 2]]), 0 * nodes, {}, at, at, np.zeros(len(at)))
+        )
+
+    assert seen([[0.5, 0.5, 0.0]])[0] < 0 < seen([[0.5, 0.5, 1.0]])[0]
+    assert abs(seen([[1.0, 0.5, 0.5]])[1] - 25) < 1e-9 and abs(seen([[0.0, 0.5, 0.5]])[1] - 205) < 1e-9

@@ -88,3 +88,15 @@ def test_a_cube_without_a_block(block: str) -> None:
     }
     result = right(scene.override(**dict.fromkeys(gone.get(block, (block,)))))
     assert (result.u is None, result.theta is None) == (block == "motion", block == "heat")
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1.0])
+@pytest.mark.parametrize("viscous", [False, True])
+def test_a_body_that_is_carried_without_strain_ends_right(gap: float, viscous: bool) -> None:
+    """Its energies are all rounding until it touches; then they are not."""
+    more = {"viscosity.lame": [0.1, 0.1]} if viscous else {}
+    scene = warmslip.load("quasistatic_punch").override(**{"mesh.n": 8, "contact.gap": gap} | more)
+    job = warmslip.Run(scene)
+    touched = sum(report.normal_force > 0 for _, report in job.steps())
+    assert job.outcome == "right" and (touched > 0) == (gap < 0.01)
+    assert max(job.worst.values()) < 1e-9

@@ -1,5 +1,6 @@
 #include "warmslip/ledger.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <initializer_list>
@@ -196,10 +197,15 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   // the law's pressure, with its rounding, enters four terms: stored before and after, damping, friction
   const double touching = std::max({l.contact, contact_before, l.contact_damping, l.friction, std::abs(l.gap_work)});
   l.energy_floor = touching > 0 ? 4 * l.law_floor * relative(touching, terms) : 0;
-  l.energy_residual = relative(l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping +
-                                   l.elastic_damping + l.contact_damping + l.viscous + l.friction - l.load_work -
-                                   l.expansion_work - l.gap_work - l.support_work,
-                               terms);
+  const double sum = l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
+                     l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work -
+                     l.support_work;
+  l.energy_residual = relative(sum, terms);
+  // what rounding hides of the forces it hides of their work; where there are none, the work is all rounding
+  if (acted_on_)
+    l.energy_floor += l.force_floor;
+  else
+    l.energy_residual = unexplained(sum, *std::max_element(terms.begin(), terms.end()), work_rounding_);
 }
 
 // Force and moment (v rigid), and the equation of motion at every free node: the supports' reactions are the residuals
@@ -207,7 +213,7 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
 template <int d>
 void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
-  double force_rounding = 0, moment_rounding = 0;
+  double force_rounding = 0, moment_rounding = 0, work_rounding = 0;
   // largest over the nodes: what the equation leaves over, the size of its terms, the forces in it and those applied
   enum { motion, motion_size, forces_here, applied, internal_size };
   std::array<double, 5> most{};
@@ -215,7 +221,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   const double u = largest(after.u), w = largest(after.w);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e(after.elastic_u), b(viscous_w_),
-        g(in.expansion_theta), c(contact_force_), velocity(after.w);
+        g(in.expansion_theta), c(contact_force_), velocity(after.w), displacement(after.u);
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const Point<d> position =
           layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
@@ -229,6 +235,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       force.add(position, contact_here);
       const Point<d> internal = at(elastic_rows_) * u + at(viscous_rows_) * w + expansion.cwiseAbs();
       force_rounding += internal.squaredNorm();
+      const Point<d> way = at(*displacement).cwiseAbs() + in.k * at(*velocity).cwiseAbs();
+      work_rounding += std::pow(way.dot(internal), 2);
       moment_rounding += internal.squaredNorm() * position.squaredNorm();
       const Point<d> left = inertia - load + contact_here + viscous + elastic - expansion;
       if (clamped_[static_cast<std::size_t>(i)]) {
@@ -249,6 +257,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   const double forces = sizes.head(d).maxCoeff(), moments = sizes.tail(sizes.size() - d).maxCoeff();
   force_rounding = layout_.sum(force_rounding);
   moment_rounding = layout_.sum(moment_rounding);
+  work_rounding_ = layout_.sum(work_rounding);
   l.support_work = layout_.sum(l.support_work);
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, i < d ? unexplained(sums[i], forces, force_rounding)
@@ -258,7 +267,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   most = over_ranks(layout_.comm(), most);
   l.force_residual = std::max(l.force_residual, relative(most[motion], {most[motion_size]}));
   // without any load there is nothing a strain of rounding could be mistaken for
-  if (most[applied] > 0)
+  acted_on_ = most[applied] > 0;
+  if (acted_on_)
     l.force_floor = std::numeric_limits<double>::epsilon() * relative(most[internal_size], {most[forces_here]});
 }
 

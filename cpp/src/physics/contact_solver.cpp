@@ -221,7 +221,9 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
       const double spring = point.weight * law.stiffness * k;
       return spring > 0 ? std::max(0.0, (z + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
     }
-    double low = 0, high = point.weight * law.pressure(point.penetration + k * z / rate);
+    // no more than what holds the point at r = 0; a law of the user's may know no pressure beyond
+    double low = 0, high = std::min(point.weight * law.pressure(point.penetration + k * z / rate),
+                                    std::max(0.0, z + rate * point.penetration / k));
     for (int i = 0; i < 60 && low < high; ++i) {
       const double middle = 0.5 * (low + high);
       (point.weight * law.pressure(point.penetration + k * (z - middle) / rate) > middle ? low : high) = middle;
@@ -269,6 +271,8 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     if (step % 200 == 199) {
       solution.force = force;
       if (newton(problem, false, solution)) return true;
+      solution.force = force;  // a law that bends, or ends, has to be approached step by step
+      if (!by_status(problem) && newton(problem, true, solution)) return true;
     }
   }
   return false;

@@ -23,6 +23,7 @@ KINDS = {
     "temperature": ("fields", "trajectories, a panel each"),
     "mises": ("fields", "trajectories, a panel each"),
     "errors": ("convergence", "studies named READING_THETA_COUPLING.csv, a panel each"),
+    "study": ("study", "any study, a panel each"),
     "corrected": ("convergence", "the table of rates, then studies it speaks of"),
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
     "table": ("maps", "the table of readings"),

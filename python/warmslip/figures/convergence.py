@@ -20,6 +20,7 @@ MORE_X, MORE_Y = (0.2, 0.5), (1e-5, 5e-5, 1e-4, 5e-4, 1e-3, 0.5, 1.0, 5.0)
 
 def diagonal(path: Path) -> list[dict[str, str]]:
     """The lines of a study with h = k that have an error, coarse to fine."""
+    case(path)  # raises for a study that is not one of the workflow
     lines = [line for line in rows(path) if line["n"] == line["steps"] and np.isfinite(float(line["e_u_V"]))]
     return sorted(lines, key=lambda line: int(line["n"]))
 

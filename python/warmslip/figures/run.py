@@ -22,7 +22,7 @@ from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MAPS = {"displacement": cm.imola, "von Mises stress": cm.batlow, "temperature": cm.lipari}
 STATUS = (("open", GREY), ("stick", SKY), ("slip", VERMILLION))  # the same in every figure of a run
-COLOURS_OF_STATUS = "grey, blue, red"
+COLOURS_OF_STATUS = "grey, blue, orange"
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, INK)
 WIDTHS = {2: 3.9, 3: 4.6}
 DOT: Any = {"ms": 3.5, "mec": INK, "mew": 0.5}
@@ -75,6 +75,7 @@ def panel(
         low, high = moved.min(axis=0), moved.max(axis=0)
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=high - low)
         ax.set_axis_off()
+        ax.view_init(*_seen_from(body))
     else:
         ax = figure.add_subplot(place)
         drawn: Any = {"cmap": colours, "norm": norm, "rasterized": True}
@@ -97,6 +98,16 @@ def panel(
     if bar:
         extend = "max" if norm.vmax is not None and values.max() > norm.vmax else "neither"
         figure.colorbar(plt.cm.ScalarMappable(norm, colours), ax=ax, shrink=0.75, pad=0.02, extend=extend)
+
+
+def _seen_from(body: Body) -> tuple[float, float]:
+    """Elevation and azimuth in degrees that show the contact points, from above without any."""
+    if not len(body.points):
+        return 30.0, -60.0
+    towards = body.points.mean(axis=0) - 0.5 * (body.nodes.min(axis=0) + body.nodes.max(axis=0))
+    towards = towards / (np.ptp(body.nodes, axis=0).max() + 1e-300)
+    azimuth = float(np.degrees(np.arctan2(towards[1], towards[0]))) + 25 if np.hypot(*towards[:2]) > 0.1 else -60.0
+    return (-25.0 if towards[2] < -0.1 else 30.0), azimuth
 
 
 def norm_of(bodies: Iterable[Body], name: str) -> Normalize:
@@ -135,8 +146,10 @@ def bodies(body: Body, factor: float) -> tuple[Figure, str]:
         panel(figure, grid[i], body, name, factor=factor, norm=norm_of([body], name))
     said = [f"{name} {number(float(v.min()))} to {number(float(v.max()))}" for name, v in body.fields.items()]
     points = ""
+    if body.dim == 2 and "von Mises stress" in body.fields:
+        points = "; the von Mises stress is that with sigma_zz = 0"
     if len(body.points):
-        points = "; contact points: " + ", ".join(
+        points += "; contact points: " + ", ".join(
             f"{int((body.status == i).sum())} {name}" for i, (name, _) in enumerate(STATUS)
         )
         if body.dim == 2:
@@ -156,7 +169,8 @@ def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, st
                 for i, (_, colour) in enumerate(STATUS):
                     on = fields["status"] == i
                     ax.plot(x[on], values[on], "o", mfc=colour, **DOT)
-                ax.plot(x, values, "-", color=GREY, lw=0.8, zorder=0)
+                if len(np.unique(x)) == len(x):  # else a node has a point for the normal of each of its facets
+                    ax.plot(x, values, "-", color=GREY, lw=0.8, zorder=0)
                 ax.axhline(0, color=GREY, lw=0.5)
                 ax.set_xlabel("along the part")
             else:

@@ -64,7 +64,12 @@ class Case(NamedTuple):
 
 
 def case(name: str | Path) -> Case:
-    return Case(*Path(name).stem.split("_"))
+    words = Path(name).stem.split("_")
+    if len(words) not in (3, 4):
+        raise ValueError(
+            f"'{Path(name).stem}' is not called READING_THETA_COUPLING; `warmslip draw study` draws any study"
+        )
+    return Case(*words)
 
 
 def applied() -> AbstractContextManager[None]:
