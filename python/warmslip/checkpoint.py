@@ -185,7 +185,7 @@ def load(folder: Path, job: Run) -> int:
             raise ValueError(f"{foreign}; run it as it was, or without --resume from the start")
         return 0
     record, arrays = found
-    if record.get("next") != _values(job, (record["step"] + 1) * job.scene.step):
+    if record.get("next", []) != _values(job, (record["step"] + 1) * job.scene.step):
         raise ValueError(
             f"checkpoint.npz is of another {FUNCTIONS}; run it as it was, or without --resume from the start"
         )

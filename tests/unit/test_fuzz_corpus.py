@@ -28,7 +28,7 @@ SOUND = {
     "lists": ["five_nodes", "square", "tetrahedra"],
     "mesh": ["square.msh", "square_41.msh", "square_binary.msh", "two_tetrahedra.msh"],
     "scene": ["mesh_file.toml", "paper_mixed.toml", "two_materials.toml"],
-    "trajectory": ["least.json", "two_steps.json"],
+    "trajectory": ["two_steps.json"],
 }
 
 

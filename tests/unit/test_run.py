@@ -250,7 +250,7 @@ def test_stiffness_that_is_not_touched_excuses_nothing(small: MakeScene) -> None
         needle = {"mesh__lengths": [1e-4, 1.0], "contact__gap": 0.1, "contact__stiffness": stiffness}
         result = warmslip.run(small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, **needle))
         assert result.outcome == "identity_violated"
-        assert result.summary["failure"]["energy_floor"] == 0
+        assert result.summary["failure"]["energy_floor"] == result.summary["failure"]["force_floor"] < 1e-9
 
 
 def test_stiffness_that_is_hardly_touched_excuses_little(small: MakeScene) -> None:

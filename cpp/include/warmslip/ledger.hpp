@@ -26,7 +26,7 @@ struct Ledger {
   /// the same balance for theta; `held`: of parts held at a temperature
   double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, held;
   double energy_residual, heat_residual, force_residual, law_residual;  ///< relative to the largest term
-  /// What rounding alone can cause, likewise: of the contact law, of the law's terms in the energy, of the internal
+  /// What rounding alone can cause, likewise: of the contact law, of the energy, of the internal
   /// forces (a body that moves far for its deformation has no digits left in its strain).
   double law_floor, energy_floor, force_floor;
 };
