@@ -12,10 +12,10 @@ constexpr const char* beyond_doubles = "a number overflowed; scale the data";
 
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>
-StepReport<d> not_taken(Outcome outcome, std::string reason) {
+StepReport<d> not_taken(Outcome outcome, const std::string& reason) {
   StepReport<d> report;
   report.outcome = outcome;
-  report.reason = std::move(reason);
+  report.reason = reason;
   Ledger& l = report.ledger;
   for (double* unknown : {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.law_floor,
                           &l.energy_floor, &l.force_floor})
