@@ -76,9 +76,9 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
     monkeypatch.setattr(blocks, "combinations", lambda: iter(ALL[-2:]))
     for row in blocks.table(4, 20):
         assert (row["unknowns"], row["substitutions"], row["refinements"]) == (75, 2, 0)
-        assert row["products"] == len(expected(row))
+        assert row["products"] == len(expected(row)) and {k: row[k] for k in ALL[0]} in ALL
         assert 0 < row["least"] < row["step"] < 10 * row["whole_model"]
-        assert row["contact"] > 0 and row["balances"] > 0
+        assert row["contact_solver"] > 0 and row["balances"] > 0
         for name in ("over_whole_model", "over_least", "over_floor"):
             assert 0 < row[f"{name}_lower"] <= row[name] <= row[f"{name}_upper"]
     wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
@@ -87,7 +87,7 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
 
 def test_the_ratios_are_those_of_the_seconds_given() -> None:
     """A step of 10 with 2 in contact and 3 in its books, least code of 4, a whole model of 20; one disturbed step in five."""
-    calm = {"step": 10.0, "whole_model": 20.0, "contact": 2.0, "balances": 3.0, "least": 4.0}
+    calm = {"step": 10.0, "whole_model": 20.0, "contact_solver": 2.0, "balances": 3.0, "least": 4.0}
     seconds = {name: np.full(40, value) for name, value in calm.items()}
     seconds["step"][::5] = 1000
     seconds["step"][:5] = 7777  # the first turn
