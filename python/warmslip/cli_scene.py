@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -55,7 +56,7 @@ def run(
     if rank == 0:
         typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
     if not result.right:
-        raise typer.Exit(130 if result.outcome == "interrupted" else 1)
+        sys.exit(130 if result.outcome == "interrupted" else 1)  # it has said why
 
 
 def _refuse_dashless(petsc: str) -> None:

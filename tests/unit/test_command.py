@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import Command
 
+from warmslip import cli, study
 from warmslip.scene import load
 
 SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
@@ -167,3 +168,17 @@ def test_what_is_odd_is_said_before_a_run(command: Command) -> None:
     assert done.returncode == 0 and "note: the gap of 'bottom' is negative" in done.stderr
     dry = command("run", "two_materials", "--dry-run", "--set", "regions.insert.where=x > 9")
     assert dry.returncode == 2 and "no cell lies in it" in dry.stderr
+
+
+def test_an_interrupted_command_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "study", interrupted)
+    monkeypatch.setattr("sys.argv", ["warmslip", "study", "paper_mixed", "--out", str(tmp_path / "s.csv")])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == 130 and "interrupted; nothing of this call is kept" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
