@@ -455,3 +455,28 @@ def test_an_overshooting_iterate_is_led_back(small: Small) -> None:
     pushed = {"loads__body": [0.0, -20.0], "time__steps": 2, "time__end": 10.0}
     result = warmslip.run(small(**pushed), laws={"bottom": stiff})
     assert result.right and 1e-3 < result.summary["contact"]["max_penetration"] < 0.1
+
+
+def test_how_exact_a_law_has_to_be() -> None:
+    """An energy to 1e-6 of its neighbours', a derivative to 1e-3 at nine samples of ten; beyond, it is refused."""
+
+    def near(error: float) -> str | None:
+        law = Law(compliance=lambda r: (*linear(r)[:2], linear(r)[2] * (1 + error * (r > 0.01))))
+        watch = laws.Watched.of("bottom", law, 1.0).compliance
+        assert watch is not None
+        for r in (0.01, 0.01000001):
+            watch(r)
+        return watch.wrong
+
+    assert near(1e-7) is None and "is the integral of" in str(near(1e-5))
+
+    def sloped(error: float, above: float, faster: float = 0.0) -> Law:
+        return Law(friction=lambda p, s: (MU * p, MU * (1 + error * (p > above and s >= faster)), 0.0))
+
+    sloped(5e-4, 0.0).tried("bottom", 1.0)
+    sloped(0.5, 50.0, faster=0.5).tried("bottom", 1.0)  # at one pressure of nine, three speeds of nine
+    for law in (sloped(5e-3, 0.0), sloped(0.5, 50.0)):
+        with pytest.raises(ValueError, match="correct the second value"):
+            law.tried("bottom", 1.0)
+    with pytest.raises(ValueError, match="three finite numbers"):
+        Law(friction=lambda p, s: (MU * p, MU, 0.0) if s > 0 else (math.nan, 0.0, 0.0)).tried("bottom", 1.0)
