@@ -250,7 +250,7 @@ def test_stiffness_that_is_not_touched_excuses_nothing(small: MakeScene) -> None
         needle = {"mesh__lengths": [1e-4, 1.0], "contact__gap": 0.1, "contact__stiffness": stiffness}
         result = warmslip.run(small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, **needle))
         assert result.outcome == "identity_violated"
-        assert result.summary["failure"]["energy_floor"] == result.summary["failure"]["force_floor"] < 1e-9
+        assert result.summary["failure"]["energy_floor"] == 16 * result.summary["failure"]["force_floor"] < 1e-8
 
 
 def test_stiffness_that_is_hardly_touched_excuses_little(small: MakeScene) -> None:
@@ -261,7 +261,7 @@ def test_stiffness_that_is_hardly_touched_excuses_little(small: MakeScene) -> No
     )
     assert result.outcome == "identity_violated"
     failure = result.summary["failure"]
-    assert failure["law_floor"] > 1e-7 > 100 * failure["energy_floor"]
+    assert failure["law_floor"] > 1e-7 > 10 * failure["energy_floor"]
     assert 1e-9 < failure["energy"] < 4 * failure["law_floor"]
 
 

@@ -100,3 +100,16 @@ def test_a_body_that_is_carried_without_strain_ends_right(gap: float, viscous: b
     touched = sum(report.normal_force > 0 for _, report in job.steps())
     assert job.outcome == "right" and (touched > 0) == (gap < 0.01)
     assert max(job.worst.values()) < 1e-9
+
+
+@pytest.mark.parametrize("n", [8, 32])
+@pytest.mark.parametrize("weight", [1e-6, 1e-4])
+def test_a_carried_body_of_little_weight_ends_right(weight: float, n: int) -> None:
+    """Carried sideways at last its weight does no work, and what its energy holds is little beside how far it came."""
+    scene = warmslip.load("quasistatic_punch").override(
+        **{"mesh.n": n, "contact.gap": 1.0, "loads.body": [0.0, -weight]}
+    )
+    job = warmslip.Run(scene)
+    assert sum(1 for _ in job.steps()) == scene.time.steps and job.outcome == "right"
+    assert job.worst["energy"] <= 1e-9 + job.floors["energy_floor"] < 1e-5
+    assert job.floors["energy_floor"] == pytest.approx(16 * job.floors["force_floor"]) and job.floors["force_floor"] > 0

@@ -68,6 +68,7 @@ class Bookkeeper {
   VecHandle viscous_w_, contact_force_;             // B w, E lambda
   VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
   bool acted_on_ = false;     // in the step that is being closed: whether loads, contact or heat apply any force
+  double work_size_ = 0;      // of loads and supports, as if all their forces were along the way
   double work_rounding_ = 0;  // sum of the squares of what rounding does to the work at the nodes, in units of eps
   Eigen::VectorXd elastic_rows_, viscous_rows_, conduction_rows_;  // sums of |entries|, for what rounding explains
   std::vector<PetscInt> unknowns_, nodes_;                         // of contact, relative to the owned range

@@ -191,9 +191,9 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
   const double contact_before = l.contact - l.contact_change;
-  const std::initializer_list<double> terms{l.kinetic,   kinetic_before,   l.elastic,  elastic_before,
-                                            l.contact,   contact_before,   l.viscous,  l.friction,
-                                            l.load_work, l.expansion_work, l.gap_work, l.support_work};
+  const std::initializer_list<double> terms{
+      l.kinetic,  kinetic_before, l.elastic,        elastic_before, l.contact,      contact_before, l.viscous,
+      l.friction, l.load_work,    l.expansion_work, l.gap_work,     l.support_work, work_size_};
   // the law's pressure, with its rounding, enters four terms: stored before and after, damping, friction
   const double touching = std::max({l.contact, contact_before, l.contact_damping, l.friction, std::abs(l.gap_work)});
   l.energy_floor = touching > 0 ? 4 * l.law_floor * relative(touching, terms) : 0;
@@ -203,7 +203,7 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   l.energy_residual = relative(sum, terms);
   // what rounding hides of the forces it hides of their work; where there are none, the work is all rounding
   if (acted_on_)
-    l.energy_floor += l.force_floor;
+    l.energy_floor += 16 * l.force_floor;
   else
     l.energy_residual = unexplained(sum, *std::max_element(terms.begin(), terms.end()), work_rounding_);
 }
@@ -213,7 +213,7 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
 template <int d>
 void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
-  double force_rounding = 0, moment_rounding = 0, work_rounding = 0;
+  double force_rounding = 0, moment_rounding = 0, work_rounding = 0, work_size = 0;
   // largest over the nodes: what the equation leaves over, the size of its terms, the forces in it and those applied
   enum { motion, motion_size, forces_here, applied, internal_size };
   std::array<double, 5> most{};
@@ -235,6 +235,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       force.add(position, contact_here);
       const Point<d> internal = at(elastic_rows_) * u + at(viscous_rows_) * w + expansion.cwiseAbs();
       force_rounding += internal.squaredNorm();
+      work_size += in.k * load.norm() * at(*velocity).norm();
       const Point<d> way = at(*displacement).cwiseAbs() + in.k * at(*velocity).cwiseAbs();
       work_rounding += std::pow(way.dot(internal), 2);
       moment_rounding += internal.squaredNorm() * position.squaredNorm();
@@ -242,6 +243,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       if (clamped_[static_cast<std::size_t>(i)]) {
         force.add(position, -left);
         l.support_work += in.k * left.dot(at(*velocity));
+        work_size += in.k * left.norm() * at(*velocity).norm();
       } else {
         raise(motion, left.cwiseAbs().maxCoeff());
       }
@@ -258,6 +260,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   force_rounding = layout_.sum(force_rounding);
   moment_rounding = layout_.sum(moment_rounding);
   work_rounding_ = layout_.sum(work_rounding);
+  work_size_ = layout_.sum(work_size);
   l.support_work = layout_.sum(l.support_work);
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, i < d ? unexplained(sums[i], forces, force_rounding)
