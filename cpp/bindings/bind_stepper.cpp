@@ -19,7 +19,8 @@ void bind(py::module_& m) {
       .def_readonly("normal_force", &R::normal_force, "int p_nu, force")
       .def_readonly("traction", &R::traction, "int sigma nu over Gamma_C, (d)")
       .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
-      .def_readonly("ledger", &R::ledger);
+      .def_readonly("ledger", &R::ledger)
+      .def_readonly("errors", &R::errors, "estimated, of the fields");
 
   using Maybe = std::optional<Vec>;
   using S = Stepper<d>;
@@ -101,11 +102,12 @@ void bind_stepper(py::module_& m) {
       .value("not_finite", Outcome::not_finite)
       .value("identity_violated", Outcome::identity_violated)
       .value("precision_lost", Outcome::precision_lost)
+      .value("unsupported", Outcome::unsupported)
       .value("solver_failed", Outcome::solver_failed);
   py::enum_<Stage>(m, "Stage")
       .value("none", Stage::none)
       .value("newton", Stage::newton)
-      .value("line_search", Stage::line_search)
+      .value("restart", Stage::restart)
       .value("fixed_point", Stage::fixed_point)
       .value("enumeration", Stage::enumeration);
   py::class_<ContactOptions>(m, "ContactOptions")
@@ -148,10 +150,22 @@ void bind_stepper(py::module_& m) {
   term("heat_residual", &Ledger::heat_residual);
   term("force_residual", &Ledger::force_residual);
   term("law_residual", &Ledger::law_residual);
-  term("law_floor", &Ledger::law_floor);
-  term("energy_floor", &Ledger::energy_floor);
-  term("force_floor", &Ledger::force_floor);
+  term("force_defect", &Ledger::force_defect);
+  term("heat_defect", &Ledger::heat_defect);
   ledger.attr("terms") = py::tuple(terms);
+
+  auto errors = py::class_<Errors>(m, "Errors",
+                                   "Estimated relative errors of the fields of one step; nan is absent or not measured.");
+  py::list fields;
+  const auto field = [&](const char* attribute, double Errors::*member) {
+    errors.def_readonly(attribute, member);
+    fields.append(attribute);
+  };
+  field("u", &Errors::u);
+  field("theta", &Errors::theta);
+  field("stress", &Errors::stress);
+  field("contact_force", &Errors::contact_force);
+  errors.attr("fields") = py::tuple(fields);
 
   auto cost =
       py::class_<Cost>(m, "Cost", "What a run cost so far: CPU seconds of this process, counts, bytes of the factors.");

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
+ESTIMATED = ("u", "theta", "stress", "contact_force")  # fields whose errors are estimated
 FUNCTIONS = "set of Python functions"
 STATUSES = (0, 1, 2)  # open, stick, slip
 # where laws of the user's are asked, to be told from others: penetration over the size of the body; pressure and slip speed
@@ -81,7 +82,7 @@ def save(folder: Path, job: Run) -> None:
         "next": following,
         "time": float(stepper.time).hex(),
         "worst": job.worst,
-        "floors": job.floors,
+        "errors": job.errors,
         "newton_max": job.newton_max,
         "stages": job.stages,
     }
@@ -135,13 +136,13 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
     if not all(arrays[name].dtype == float and np.isfinite(arrays[name]).all() for name in shapes.keys() - {"status"}):
         return False
     try:
-        tables = [(record["worst"], job.worst), (record["floors"], job.floors)]
+        worst, errors = record["worst"], record["errors"]
         counts = [record["step"], record["newton_max"], *record["stages"].values()]
         return (
             math.isfinite(float.fromhex(record["time"]))
-            and all(
-                table.keys() == own.keys() and {type(v) for v in table.values()} == {float} for table, own in tables
-            )
+            and worst.keys() == job.worst.keys()
+            and errors.keys() <= set(ESTIMATED)
+            and all(type(v) is float for v in (*worst.values(), *errors.values()))
             and all(type(count) is int and count >= 0 for count in counts)
             and 0 < record["step"] <= job.scene.time.steps
         )
@@ -193,6 +194,6 @@ def load(folder: Path, job: Run) -> int:
     u, w, theta = (arrays.get(name, np.zeros((nodes, 1))) for name in FIELDS)
     job.discretisation.state(job.stepper, u, w, theta, float.fromhex(record["time"]))
     job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
-    job.worst, job.floors = record["worst"], record["floors"]
+    job.worst, job.errors = record["worst"], record["errors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
     return int(record["step"])

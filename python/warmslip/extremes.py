@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from warmslip.runner import FLOORS, IDENTITIES, Run
+from warmslip.runner import FIELDS, IDENTITIES, Run
 from warmslip.scene import FullScene, SceneError
 
 Overrides = dict[str, Any]
@@ -51,7 +51,7 @@ LADDERS: dict[str, tuple[Callable[[Any], Overrides], list[Any]]] = {
 }
 
 
-STAGES = ("none", "newton", "line_search", "fixed_point", "enumeration")
+STAGES = ("none", "newton", "restart", "fixed_point", "enumeration")
 # a right answer is right for another factorization too, up to the condition of the step
 AGREEMENT = 1e-6
 
@@ -65,7 +65,7 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     """
     make, _ = LADDERS[ladder]
     line: dict[str, Any] = {"ladder": ladder, "value": value, "outcome": "", "reason": ""}
-    line |= dict.fromkeys([*IDENTITIES, *FLOORS, "disagreement"], float("nan")) | {
+    line |= dict.fromkeys([*IDENTITIES, *(f"error_{field}" for field in FIELDS), "disagreement"], float("nan")) | {
         "newton_largest": 0,
         "stage": "",
         "steps": 0,
@@ -82,10 +82,11 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     except (RuntimeError, MemoryError) as failure:
         return line | {"outcome": "solver_failed", "reason": str(failure).replace("\n", " "), "verdict": "stopped"}
     difference = disagreement(job, other)
-    reached = job.failure or job.floors | job.worst  # of the step that was not taken, where there is one
+    reached = job.failure or job.worst  # of the step that was not taken, where there is one
     line |= {"outcome": job.outcome, "disagreement": difference} | {
-        key: reached.get(key, float("nan")) for key in (*IDENTITIES, *FLOORS)
+        key: reached.get(key, float("nan")) for key in IDENTITIES
     }
+    line |= {f"error_{field}": value for field, value in job.errors.items()}
     line |= {
         "newton_largest": job.newton_max,
         "stage": max(job.stages, key=STAGES.index),

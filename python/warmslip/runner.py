@@ -26,7 +26,7 @@ Observer = Callable[[State, Any], None]
 log = logging.getLogger(__name__)
 
 IDENTITIES = ("energy", "heat", "force", "law")
-FLOORS = ("law_floor", "energy_floor", "force_floor")
+FIELDS = ("u", "theta", "stress", "contact_force")  # whose errors are estimated, `_core.Errors`
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,12 @@ class Result:
 def residuals(report: Any) -> dict[str, float]:
     """The step's relative residual of each identity, dimensionless."""
     return {name: float(getattr(report.ledger, f"{name}_residual")) for name in IDENTITIES}
+
+
+def estimates(report: Any) -> dict[str, float]:
+    """Estimated relative errors of the fields that were measured in the step, dimensionless."""
+    found = {name: float(getattr(report.errors, name)) for name in FIELDS}
+    return {name: value for name, value in found.items() if value == value}
 
 
 def worse(one: float, other: float) -> float:
@@ -89,7 +95,7 @@ class Run:
         self.discretisation = discretisation or discretise(scene, comm=self.comm, loads=loads, laws=laws)
         self.stepper = self.discretisation.stepper(backend=backend)
         self.worst = dict.fromkeys(IDENTITIES, 0.0)
-        self.floors = dict.fromkeys(FLOORS, 0.0)
+        self.errors: dict[str, float] = {}  # largest estimated relative error of each field that was measured
         self.outcome = "right"
         self.report: Any = None
         self._resumed = 0  # steps of an earlier process
@@ -128,16 +134,17 @@ class Run:
             if report.outcome != _core.Outcome.right:
                 wrong = self._wrong_law()
                 self.outcome = "law_failed" if wrong else report.outcome.name
-                numbers = residuals(report) | {name: float(getattr(report.ledger, name)) for name in FLOORS}
-                known = {name: value for name, value in numbers.items() if value == value}  # nan: not computed
+                known = {name: value for name, value in residuals(report).items() if value == value}  # nan: not computed
                 self.failure = {"step": n, "reason": wrong or report.reason} | known
+                if errors := estimates(report):
+                    self.failure["digits"] = summary.digits(errors)
                 log.info("step %d was not taken: %s", n, self.outcome)
                 return
             self.report = report
             for name, value in residuals(report).items():
                 self.worst[name] = worse(self.worst[name], value)
-            for name in FLOORS:
-                self.floors[name] = worse(self.floors[name], getattr(report.ledger, name))
+            for name, value in estimates(report).items():
+                self.errors[name] = max(self.errors.get(name, 0.0), value)
             if log.isEnabledFor(logging.DEBUG):
                 books = ", ".join(f"{name} {value:.1e}" for name, value in residuals(report).items())
                 log.debug("step %d: %d Newton iterations, %s", n, report.newton_iterations, books)
@@ -177,7 +184,7 @@ def run(
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
     right, contact_not_converged, not_finite, data_not_finite (a load, a gap), law_failed (a law of one's own), identity_violated,
-    precision_lost, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or
+    precision_lost, unsupported, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or
     SIGTERM, which leave a checkpoint.
     Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
     cannot be written.

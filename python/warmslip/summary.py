@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import resource
 import time
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,11 @@ from warmslip.state import resultants
 
 if TYPE_CHECKING:
     from warmslip.runner import Run
+
+
+def digits(errors: dict[str, float]) -> dict[str, float]:
+    """Decimal digits that estimated relative errors leave to be trusted, 16 at most, by field."""
+    return {name: round(min(16.0, max(0.0, -math.log10(value))), 1) if value > 0 else 16.0 for name, value in errors.items()}
 
 
 def summary(job: Run) -> dict[str, Any]:
@@ -41,7 +47,8 @@ def summary(job: Run) -> dict[str, Any]:
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
         "contact": contact | counts | {"traction": traction, "parts": parts},
-        "identities": job.worst | job.floors,
+        "identities": job.worst,
+        "digits": digits(job.errors),
         "newton": {
             "iterations": cost.newton_iterations,
             "largest_step": job.newton_max,

@@ -113,7 +113,8 @@ double bend(const ContactLaw& law) {
 
 TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite difference", D, Two, Three) {
   constexpr int d = D::value;
-  const double k = 0.2, alpha = 0.3, beta = 0.7, step = 1e-6;
+  const double k = 0.2, step = 1e-6;
+  const OwnCompliance own{0.02, 1.4};
   for (const auto& [name, law] : laws()) {
     CAPTURE(name);
     Random random(3);
@@ -122,7 +123,7 @@ TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite differenc
       const ContactPoint<d> point{random.point<d>().normalized(), 0.5, 0.2 * random() + 0.1, Point<d>::Zero(), 0};
       const Point<d> f = 2 * random.point<d>(), w = random.point<d>();
       const auto at = [&](const Point<d>& force, const Point<d>& velocity) {
-        return residual<d>(law, point, k, alpha, beta, force, velocity);
+        return residual<d>(law, point, k, own, force, velocity);
       };
       const auto here = at(f, w);
       Tensor2<d> by_force, by_velocity;
@@ -131,18 +132,22 @@ TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite differenc
         const Point<d> e = step * Point<d>::Unit(a);
         const auto f1 = at(f + e, w), f0 = at(f - e, w), w1 = at(f, w + e), w0 = at(f, w - e);
         for (const auto* side : {&f1, &f0, &w1, &w0})
-          kink = kink || side->status != here.status || side->touching != here.touching;
+          kink = kink || side->key() / 10 != here.key() / 10;
         by_force.col(a) = (f1.value - f0.value) / (2 * step);
         by_velocity.col(a) = (w1.value - w0.value) / (2 * step);
       }
-      if (kink || std::abs(point.penetration + k * w.dot(point.normal) - bend(law)) < 1e-3) continue;
+      const double r = point.penetration + k * w.dot(point.normal), y = r + own.normal * f.dot(point.normal);
+      const double lambda = f.dot(point.normal), p = law.compliance.pressure(bend(law));
+      if (kink || std::abs(r - bend(law)) < 1e-3 || std::abs(y - bend(law) - own.normal * point.weight * p) < 1e-3 ||
+          std::abs(lambda / point.weight - p) < 1e-3)
+        continue;
       ++seen[static_cast<std::size_t>(here.status)];
       CHECK((by_force - here.by_force).norm() <= 1e-7 * (1 + here.by_force.norm()));
       CHECK((by_velocity - here.by_velocity).norm() <= 1e-6 * (1 + here.by_velocity.norm()));
     }
     CHECK(seen[0] + seen[1] + seen[2] > 200);
     if (law.piecewise_linear() && law.friction.coefficient > 0 && law.friction.cohesion == 0)
-      for (const int count : seen) CHECK(count > 20);
+      for (const int count : seen) CHECK(count > 10);
   }
 }
 
@@ -170,8 +175,7 @@ TEST_CASE_TEMPLATE("every law is solved within 1e-12", D, Two, Three) {
       ContactSolver<d> solver(body.compliance);
       const auto s = solver.solve(body.problem, Eigen::VectorXd::Zero(body.problem.free.size()));
       REQUIRE(s.converged);
-      double floor;
-      CHECK(law_residual(body.problem, s.force, s.velocity, &floor) <= 1e-12 + floor);
+      CHECK(law_residual(body.problem, s.force, s.velocity) <= 1e-12);
       for (std::size_t i = 0; i < body.problem.points.size(); ++i) {
         const auto row = static_cast<Eigen::Index>(i) * d;
         const auto& point = body.problem.points[i];
@@ -195,7 +199,7 @@ TEST_CASE_TEMPLATE("the residual vanishes exactly on the law", D, Two, Three) {
   const double p = 0.5 * 50 * 0.1, k = 0.2;
   const Point<d> nu = point.normal, tau = Point<d>::Unit(0), still = Point<d>::Zero();
   const auto size = [&](const Point<d>& f, const Point<d>& w) {
-    return residual<d>(law, point, k, 0.3, 0.7, f, w).value.norm();
+    return residual<d>(law, point, k, {0.2, 1.4}, f, w).value.norm();
   };
   CHECK(size(p * nu + 0.3 * p * tau, still) <= 1e-14);    // sticks
   CHECK(size(p * nu + 0.4 * p * tau, 2 * tau) <= 1e-14);  // slips, the body's force on the foundation along w
@@ -214,13 +218,11 @@ TEST_CASE_TEMPLATE("random bodies: the law within 1e-12, whatever it takes", D, 
     const auto s = solver.solve(body.problem, Eigen::VectorXd::Zero(body.problem.free.size()));
     CAPTURE(seed);
     REQUIRE(s.converged);
-    CHECK(s.law_residual <= 1e-12 + s.floor);
-    CHECK(s.floor < 1e-12);
+    CHECK(s.law_residual <= 1e-12);
     CHECK(defect(body, s) <= 1e-10);
-    double floor;
-    const double again = law_residual(body.problem, s.force, s.velocity, &floor);
-    CHECK(again <= 1e-12 + floor);
-    if (s.force.norm() > 0) CHECK(law_residual<d>(body.problem, 1.001 * s.force, s.velocity, &floor) >= 1e-4);
+    CHECK(law_residual(body.problem, s.force, s.velocity) <= 1e-12);
+    // a wrong force shows in the penetration, the less the stiffer the foundation is
+    if (s.force.norm() > 0) CHECK(law_residual<d>(body.problem, 1.001 * s.force, s.velocity) >= 1e-6);
     for (const Status status : s.status) ++statuses[static_cast<std::size_t>(status)];
     // again from the answer: nothing is left to do
     CHECK(solver.solve(body.problem, s.force).iterations == 0);
@@ -305,7 +307,6 @@ TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, wh
     if (!found[0].converged || !found[1].converged || !found[2].converged) continue;
     const std::vector<ContactSolution<d>> before = found;
     for (auto& one : found) CHECK(share_least(problem, shape, options.tolerance, one));
-    double floor;
     const auto size = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
       double sum = 0;
       for (int q = 0; q < points; ++q)
@@ -320,7 +321,7 @@ TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, wh
       CHECK((found[i].force - least).norm() <= 1e-7 * least.norm());
       CHECK(found[i].status == found[0].status);
       CHECK((vector_shape.transpose() * (found[i].force - before[i].force)).norm() <= 1e-11 * least.norm());
-      CHECK(law_residual(problem, found[i].force, found[i].velocity, &floor) <= 2e-12 + floor);
+      CHECK(law_residual(problem, found[i].force, found[i].velocity) <= 2e-12);
       CHECK(size(least, before[i].force - least) >= -1e-9 * size(least, least));  // the nearest to zero of a convex set
       moved += (before[i].force - least).norm() > 1e-3 * least.norm();
     }

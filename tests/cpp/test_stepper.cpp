@@ -77,7 +77,7 @@ struct Paper {
     CHECK(stepper.steps() == steps);
     CHECK(stepper.time() == doctest::Approx(1).epsilon(1e-14));
     CHECK(report.slip > 0);
-    CHECK(stepper.cost().refinements == (refine ? steps : 0));
+    CHECK((refine ? stepper.cost().refinements >= steps : stepper.cost().refinements == 0));
     const Norms<d> norms(layout);
     return {norms.v(stepper.level().u), norms.l2(stepper.level().w), norms.l2(stepper.level().theta),
             report.normal_force};

@@ -15,7 +15,8 @@ namespace warmslip {
 
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-/// p_nu(r) = min(stiffness max(r, 0)^exponent, most), the pressure on a penetration r = u_nu - g.
+/// p_nu(r) = min(stiffness max(r, 0)^exponent, most), the pressure on a penetration r = u_nu - g. An unlimited
+/// stiffness is a rigid foundation: r <= 0, and any pressure at r = 0 (Signorini).
 struct NormalCompliance {
   double stiffness = 0;     ///< c_nu, stress per length^exponent
   double exponent = 1;      ///< >= 1, dimensionless
@@ -29,9 +30,23 @@ struct NormalCompliance {
   /// P with P' = p_nu and P(0) = 0, energy per area.
   double energy(double r) const;
   bool linear() const { return !custom && exponent == 1 && most == unlimited; }
-  /// The tangent that sets the scale of a step whose penetration would be `r` without contact.
-  double scale(double r) const { return linear() ? stiffness : tangent(r); }
+  bool rigid() const { return !custom && stiffness == unlimited; }
+  /// The penetration under `pressure` > 0; `r` where the law does not tell (no pressure, the largest, a custom law).
+  double penetration(double pressure, double r) const;
+  /// s with s + give p_nu(s) = y: what is left of the penetration y > 0 at a point that recedes by `give` (length per
+  /// stress) under pressure. Not for custom laws.
+  double remaining(double y, double give) const;
 };
+
+/// Residual of the normal law at a point of weight `weight` with force lambda and penetration r, in units of force,
+/// and its derivatives. With the resolvent of p_nu at the trial value lambda + r / give it reads
+/// lambda - weight p_nu(s), s + give weight p_nu(s) = r + give lambda,
+/// which vanishes on the law alone and is of order one in the force for every stiffness, an unlimited one included.
+struct NormalResidual {
+  double value, by_force, by_penetration;
+  bool touching;  ///< the trial value is positive
+};
+NormalResidual normal_residual(const NormalCompliance& law, double weight, double give, double force, double r);
 
 /// A friction bound and its derivatives.
 struct FrictionBound {
@@ -83,31 +98,43 @@ struct ContactPoint {
   Point<d> normal;        ///< outward unit normal of the body
   double weight;          ///< quadrature weight, area
   double penetration;     ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
-  Point<d> displacement;  ///< u_{n-1}, for the round-off floor of r alone
+  Point<d> displacement;  ///< u_{n-1}, for the size of the terms of r alone
   double gap;             ///< g_n
   std::size_t law = 0;    ///< which of the problem's laws holds here
 };
 
-/// Residual and generalised derivative of the law, written so that zero is the law itself (Alart & Curnier,
+/// A point's own compliance, which scales the rows of its residual and does not move their zeros.
+struct OwnCompliance {
+  double normal;      ///< penetration per normal force, length per force
+  double tangential;  ///< velocity per tangential force
+};
+
+/// Residual and generalised derivative of the law at one point, written so that zero is the law itself (Alart & Curnier,
 /// Comput. Methods Appl. Mech. Eng. 92, 1991): with force lambda and velocity w,
-///   normal      alpha (lambda_nu - weight p_nu(r + k w_nu))
-///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + beta w_tau),   T = weight times the friction bound
-/// alpha (dimensionless) and beta (force per velocity) scale the rows; they do not move the zeros. Regularised friction
-/// has lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
+///   normal      see NormalResidual
+///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + w_tau / own),   T = weight times the friction bound
+/// The bound reads the pressure from the unknown force, max(lambda_nu, 0) / weight, and not from the penetration: an
+/// iterate whose penetration no force has stopped yet would have far too large a bound. Regularised friction has
+/// lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
 template <int d>
 struct PointResidual {
   Point<d> value;
   Tensor2<d> by_force, by_velocity;
   Status status;
   int slip_sign;  ///< d = 2: sign of the slip along the tangent
-  bool touching;  ///< r > 0
+  bool touching;  ///< see NormalResidual
+  bool pressed;   ///< lambda_nu > 0
+  bool apart;     ///< the residual is the force: by_force = 1, by_velocity = 0
 
   /// Of a piecewise linear law the derivative (d = 2) depends on this alone.
-  int key() const { return (touching ? 100 : 0) + static_cast<int>(status) * 10 + slip_sign; }
+  int key() const {
+    return (apart ? 10000 : 0) + (pressed ? 1000 : 0) + (touching ? 100 : 0) + static_cast<int>(status) * 10 +
+           slip_sign;
+  }
 };
 
 template <int d>
-PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, double alpha, double beta,
+PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
                           const Point<d>& force, const Point<d>& velocity);
 
 /// How far (force, velocity) is from the friction law at one point whose bound is `bound` (force): the force beyond the

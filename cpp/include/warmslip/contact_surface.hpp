@@ -9,8 +9,8 @@
 
 namespace warmslip {
 
-/// The points of all contact parts with a law, the same on every rank: contact nodes are few. Clamped nodes are left
-/// out, their reaction is the support's.
+/// The points of all contact parts with a law, the same on every rank: contact nodes are few. Nodes whose displacement
+/// is prescribed belong to them: they carry their motion to the points beside them, and bear their share of the force.
 template <int d>
 class ContactSurface {
  public:
@@ -31,10 +31,12 @@ class ContactSurface {
   std::vector<PetscInt> global_nodes() const;
   /// Values of the contact nodes on every rank: (d nodes) of a displacement-like vector, (nodes) of a temperature.
   Eigen::VectorXd nodal_values(Vec v) const;
-  /// Values at the contact points, (d points), and the transpose: forces at the points as nodal forces.
+  const std::vector<Index>& mesh_nodes() const { return nodes_; }  ///< the contact nodes in the mesh's numbering
+  /// Values at the contact points, (d points), of nodal ones, (d nodes).
   Eigen::VectorXd at_points(const Eigen::VectorXd& nodal) const;
+  /// Forces at the points as nodal forces, without those that a support takes, (d nodes).
   Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
-  /// Compliance of the points from the compliance of the nodes.
+  /// Compliance of the points from that of the nodes; a node whose displacement is prescribed has none.
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
   /// The same for scalars, one value a node and a point: (points, nodes).
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
@@ -43,6 +45,7 @@ class ContactSurface {
   const Layout<d>& layout_;
   std::vector<Index> nodes_;
   std::vector<std::size_t> contacts_;
+  Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
   Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
   RealTable<d> positions_, normals_;
@@ -50,19 +53,20 @@ class ContactSurface {
 };
 
 /// The contact problem of one step of size k from the displacement `u` at its start (d points) with the gap of its end
-/// (points); `free` and `scale` as there.
+/// (points); `free` and `rigid` as there.
 template <int d>
 ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurface<d>& surface, double k,
                                   const Eigen::VectorXd& u, const Eigen::VectorXd& gap, Eigen::VectorXd free,
-                                  double scale);
+                                  Eigen::VectorXd rigid = {});
 
 /// What the contact itself does to the heat at every contact point, see ContactHeat.
 struct ContactFlow {
   Eigen::VectorXd conductance;  ///< omega per_pressure p_nu
   Eigen::VectorXd friction;     ///< share of the frictional power, into the body
 };
+/// From the forces at the points and their velocities, (d points).
 template <int d>
-ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
-                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap);
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& force,
+                         const Eigen::VectorXd& w);
 
 }  // namespace warmslip

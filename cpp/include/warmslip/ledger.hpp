@@ -9,10 +9,14 @@ namespace warmslip {
 /// What the ledger reads of one time level; what belongs to an absent block is null or empty.
 struct Level {
   VecHandle u, w, theta;                      ///< displacement, velocity, temperature
+  VecHandle strained;                         ///< u but for a rigid motion, where the body has no support
   VecHandle momentum, elastic_u, mass_theta;  ///< rho M w, A u, M theta
   VecHandle expansion_theta, heating_w;       ///< G theta, E w
   Eigen::VectorXd contact_u, gap;             ///< u at the contact points (d points), g (points)
-  Eigen::VectorXd contact_theta;              ///< theta at the contact points, where the contact makes or leads heat
+  Eigen::VectorXd contact_force;              ///< lambda of the step that ends here (d points)
+
+  /// The displacement that the elastic forces see.
+  Vec shape() const { return strained ? strained : u; }
 };
 
 /// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0. Those of
@@ -25,19 +29,24 @@ struct Ledger {
   double load_work, expansion_work, gap_work, support_work;  ///< the last: of the reactions of moving supports
   /// the same balance for theta; `held`: of parts held at a temperature
   double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, held;
-  double energy_residual, heat_residual, force_residual, law_residual;  ///< relative to the largest term
-  /// What rounding alone can cause, likewise: of the contact law, of the energy, of the internal
-  /// forces (a body that moves far for its deformation has no digits left in its strain).
-  double law_floor, energy_floor, force_floor;
+  /// Backward errors: what a balance leaves over, against the sum of the magnitudes of what was added in it, with
+  /// |A| |u| for the products in it. A step that is solved to round-off has round-off here, however small its forces are.
+  /// The force residual is the largest over the equations of all nodes (Oettli & Prager, Numer. Math. 6, 1964) and over
+  /// force and moment; where the body has no support, inner forces have no part in the magnitudes of the latter.
+  double energy_residual, heat_residual, force_residual, law_residual;
+  /// What the equations of the nodes leave over against the largest force (flow of heat) that acts in them: says whether
+  /// the answer may be wrong, which an ill-conditioned operator makes possible in spite of round-off residuals.
+  double force_defect, heat_defect;
+  double force_scale;  ///< the largest force that acts at a node
 };
 
 struct StepInputs {
   double k;
   Vec force, heat;                 ///< load vectors
   Vec expansion_theta, heating_w;  ///< the ones the coupling used
+  Vec coupling_theta;              ///< the temperature of the former
   Eigen::VectorXd contact_force;   ///< at the points, (d points)
-  Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the law's scale
-  double contact_scale;            ///< and a force of that size
+  Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the size of its terms
   Eigen::VectorXd foundation;      ///< theta_F at the points, where the conductance depends on the pressure
 };
 
@@ -50,15 +59,21 @@ class Bookkeeper {
   /// Closes the books of the step from `before` to `after` (collective).
   Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
 
-  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response.
-  void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out) const;
-  void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out) const;
+  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`, where
+  /// given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
+  void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+                       Vec external = nullptr) const;
+  void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+                   Vec external = nullptr) const;
 
  private:
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void contact_heat(const Level& after, const StepInputs& inputs, const Eigen::VectorXd& w, Ledger& ledger);
   void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void interpolate_anew();
+  Eigen::VectorXd at_points(Vec v) const;
   void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
 
   const Layout<d>& layout_;
@@ -67,13 +82,14 @@ class Bookkeeper {
   const ContactSurface<d>& surface_;
   VecHandle viscous_w_, contact_force_;             // B w, E lambda
   VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
-  bool acted_on_ = false;     // in the step that is being closed: whether loads, contact or heat apply any force
-  double work_size_ = 0;      // of loads and supports, as if all their forces were along the way
-  double work_rounding_ = 0;  // sum of the squares of what rounding does to the work at the nodes, in units of eps
-  Eigen::VectorXd elastic_rows_, viscous_rows_, conduction_rows_;  // sums of |entries|, for what rounding explains
-  std::vector<PetscInt> unknowns_, nodes_;                         // of contact, relative to the owned range
-  std::vector<bool> clamped_, cooled_;                             // a node
-  Point<d> centroid_;                                              // moments are taken about it
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // hat functions at the contact points, found anew from positions
+  double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
+  Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
+  Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
+  std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
+  std::vector<bool> clamped_, cooled_;      // a node
+  bool supported_ = false;                  // whether any node of any rank is clamped
+  Point<d> centroid_;                       // moments are taken about it
 };
 
 }  // namespace warmslip

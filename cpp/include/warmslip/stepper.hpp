@@ -3,25 +3,47 @@
 #include "warmslip/contact_solver.hpp"
 #include "warmslip/factor.hpp"
 #include "warmslip/ledger.hpp"
+#include "warmslip/rigid_motions.hpp"
 
 namespace warmslip {
 
 /// Which time level the coupling terms take: (theta_{n-1}, w_n), (theta_{n-1}, w_{n-1}) or (theta_n, w_n).
 enum class Coupling { staggered, lagged, monolithic };
 
-/// `precision_lost`: rounding of the displacement hides the pressure of a stiff foundation or the strain of a body that
-/// moves far, see Ledger::law_floor and force_floor. `solver_failed`: a linear solve did not reach its answer
-/// (iterative ones, by PETSc's options).
-enum class Outcome { right, contact_not_converged, not_finite, identity_violated, precision_lost, solver_failed };
+/// `precision_lost`: the equations are solved to round-off and yet a field has fewer than four digits, see Digits.
+/// `unsupported`: nothing holds the body in a step without inertia. `solver_failed`: a linear solve did not reach its
+/// answer (iterative ones, by PETSc's options).
+enum class Outcome {
+  right,
+  contact_not_converged,
+  not_finite,
+  identity_violated,
+  precision_lost,
+  unsupported,
+  solver_failed
+};
 
 struct StepperOptions {
   double k;  ///< time step
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
-  double refinement = 5e-12;     ///< balances worse than this get one step of iterative refinement, relative
-  double identity_bound = 1e-9;  ///< a step whose balances are worse is not right
-  double floor_bound = 1e-6;     ///< nor is one whose contact law can be evaluated no better than this
+  double refinement = 5e-12;     ///< equations that leave more get iterative refinement, see Ledger::force_defect
+  int passes = 6;                ///< of it at most, while they help
+  double identity_bound = 1e-10;  ///< a step whose balances leave more is not right, see Ledger::energy_residual
+  double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
+  int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on
+};
+
+/// Estimated relative errors of the fields of a step, from what a step of iterative refinement changes in them (contact
+/// included), against the largest value of the field so far and, for stresses (as nodal forces) and contact forces, the
+/// largest force that acts; nan where the field is absent or was not measured. The digits are minus their decimal
+/// logarithms.
+struct Errors {
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  double u = unknown, theta = unknown, stress = unknown, contact_force = unknown;
+
+  double largest() const;
 };
 
 /// Data of one step: load vectors `force` (f, v) and `heat` (q, eta), k_c theta_F included, `gap` g (points); what
@@ -47,6 +69,7 @@ struct StepReport {
   Point<d> traction = Point<d>::Zero();           ///< int sigma nu over Gamma_C: the foundation's force on the body
   Point<d> friction_traction = Point<d>::Zero();  ///< its tangential part
   Ledger ledger{};
+  Errors errors{};
 };
 
 /// What a run costs, so far.
@@ -88,24 +111,35 @@ class Stepper {
 
  private:
   StepReport<d> attempt(const StepLoads& loads);
+  void take_factors();
+  void take_vectors();
   void momentum_right_side(const StepLoads& loads);
-  Eigen::VectorXd reduce(Vec right);
+  Eigen::VectorXd reduce(Vec right, Vec external);
+  void expand(const ContactSolution<d>& contact, Vec out, Vec strained);
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
   StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
   bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
                      ContactSolution<d>& solution);
+  bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
+  void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out);
+  void take_flow(const StepLoads& loads);
   Ledger balance(const StepInputs& inputs);
   Outcome judge(const Ledger& ledger) const;
   std::string why(Outcome outcome, const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
-  bool refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact);
+  StepInputs inputs(const StepLoads& loads, const ContactSolution<d>& contact) const;
+  Ledger refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact);
+  bool correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply);
+  void correct_heat(const StepInputs& inputs, bool apply);
+  void note(double& error, double& scale, double change, double size);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
   bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
   bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
+  bool measured_now() const;
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;
@@ -115,13 +149,20 @@ class Stepper {
   Bookkeeper<d> books_;
   double coupled_scale_ = 1;
   std::unique_ptr<Factor> momentum_, heat_;  // monolithic: momentum_ holds both fields
+  RigidMotions rigid_, constants_;           // of motion and of heat, where nothing is prescribed
   std::unique_ptr<ContactSolver<d>> contact_;
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
-  std::vector<bool> fixed_contact_;  // of the contact nodes, those whose temperature is held
-  Eigen::VectorXd free_;             // velocity of the contact points without contact force
+  VecHandle strained_w_, correction_strained_;   // velocity but for a rigid motion, where the body has no support
+  VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for rigid_ and constants_
+  std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
+  Eigen::VectorXd free_;                         // velocity of the contact points without contact force
+  Eigen::VectorXd rigid_load_;                   // load on the rigid motions
+  Eigen::MatrixXd flow_;                         // heat that contact nodes lose by their temperatures
+  Eigen::VectorXd given_flow_;                   // and what they receive whatever these are
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
+  Errors errors_, scales_{0, 0, 0, 0};  // of the step that is being taken; largest values so far
   double time_ = 0;
   Cost cost_;
 };

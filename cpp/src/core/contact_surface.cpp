@@ -28,19 +28,19 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   for (const ContactPart& contact : problem.contacts)
     if (contact.law) touching.push_back(contact.part);
   std::map<Index, Eigen::Index> number;
-  for (const Index node : nodes_of(mesh, touching))
-    if (!clamped.contains(node)) {
-      number[node] = static_cast<Eigen::Index>(nodes_.size());
-      nodes_.push_back(node);
-    }
+  for (const Index node : nodes_of(mesh, touching)) {
+    number[node] = static_cast<Eigen::Index>(nodes_.size());
+    nodes_.push_back(node);
+  }
+  free_ = Eigen::VectorXd::Ones(nodes() * d);
+  for (Eigen::Index i = 0; i < nodes(); ++i)
+    if (clamped.contains(nodes_[static_cast<std::size_t>(i)])) free_.segment<d>(i * d).setZero();
 
   std::vector<Point<d>> positions, normals;
   std::vector<double> weights;
   std::vector<Eigen::Triplet<double>> shape, scalar_shape;
   const auto add_shape = [&](std::size_t point, Index node, double value) {
-    const auto found = number.find(node);
-    if (found == number.end()) return;
-    const int row = static_cast<int>(point), column = static_cast<int>(found->second);
+    const int row = static_cast<int>(point), column = static_cast<int>(number.at(node));
     scalar_shape.emplace_back(row, column, value);
     for (int a = 0; a < d; ++a) shape.emplace_back(row * d + a, column * d + a, value);
   };
@@ -63,7 +63,6 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
       if (nodal) {
         for (int i = 0; i < d; ++i) {
           const Index node = facets.nodes(f, i);
-          if (!number.contains(node)) continue;
           auto& here = at_node[node];
           const auto same =
               std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
@@ -135,20 +134,21 @@ Eigen::VectorXd ContactSurface<d>::at_points(const Eigen::VectorXd& nodal) const
 
 template <int d>
 Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const {
-  return shape_.transpose() * forces;
+  return (shape_.transpose() * forces).cwiseProduct(free_);
 }
 
 template <int d>
 Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) const {
-  const Eigen::MatrixXd half = shape_ * compliance;
+  const Eigen::MatrixXd free = free_.asDiagonal() * compliance * free_.asDiagonal();
+  const Eigen::MatrixXd half = shape_ * free;
   return half * shape_.transpose();
 }
 
 template <int d>
 ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurface<d>& surface, double k,
                                   const Eigen::VectorXd& u, const Eigen::VectorXd& gap, Eigen::VectorXd free,
-                                  double scale) {
-  ContactProblem<d> out{{}, k, {}, std::move(free), scale};
+                                  Eigen::VectorXd rigid) {
+  ContactProblem<d> out{{}, k, {}, std::move(free), std::move(rigid)};
   for (const ContactPart& part : problem.contacts) out.laws.push_back(part.law.value_or(ContactLaw{}));
   for (Eigen::Index i = 0; i < surface.points(); ++i) {
     const Point<d> nu = surface.normals().row(i).transpose(), here = u.segment<d>(i * d);
@@ -158,17 +158,18 @@ ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurfac
 }
 
 template <int d>
-ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& u,
-                         const Eigen::VectorXd& w, const Eigen::VectorXd& gap) {
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& force,
+                         const Eigen::VectorXd& w) {
   ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
   for (Eigen::Index i = 0; i < surface.points(); ++i) {
     const ContactPart& part = problem.contacts[surface.contact(i)];
     const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
-    const double r = u.segment<d>(i * d).dot(nu) - gap[i], speed = (velocity - velocity.dot(nu) * nu).norm(),
-                 weight = surface.weights()[i];
-    flow.conductance[i] = weight * part.heat.per_pressure * part.law->compliance.pressure(r);
+    const double speed = (velocity - velocity.dot(nu) * nu).norm(), weight = surface.weights()[i],
+                 pressure = std::max(force.segment<d>(i * d).dot(nu), 0.0) / weight;
+    flow.conductance[i] = weight * part.heat.per_pressure * pressure;
     flow.friction[i] =
-        part.heat.friction_share * friction_power(part.law->friction, weight * part.law->bound(r, speed).value, speed);
+        part.heat.friction_share *
+        friction_power(part.law->friction, weight * part.law->friction.bound(pressure, speed).value, speed);
   }
   return flow;
 }
@@ -177,9 +178,9 @@ ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& sur
   template class ContactSurface<d>;                                                                              \
   template ContactProblem<d> contact_problem<d>(const Problem<d>&, const ContactSurface<d>&, double,             \
                                                 const Eigen::VectorXd&, const Eigen::VectorXd&, Eigen::VectorXd, \
-                                                double);                                                         \
+                                                Eigen::VectorXd);                                                \
   template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&,      \
-                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
+                                       const Eigen::VectorXd&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

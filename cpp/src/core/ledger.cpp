@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <map>
 
 #include "warmslip/contact_solver.hpp"
 
@@ -26,18 +27,15 @@ double dot_of_changes(const Layout<d>& layout, Vec a1, Vec a0, Vec b1, Vec b0) {
   return layout.sum(((*x1) - (*x0)).dot((*y1) - (*y0)));
 }
 
-double relative(double residual, std::initializer_list<double> terms) {
-  double largest = 0;
-  for (const double term : terms) largest = std::max(largest, std::abs(term));
-  return largest > 0 ? std::abs(residual) / largest : 0;
+// Against the size of what was added; numbers whose squares are lost to underflow count as none.
+double relative(double residual, double size) {
+  return size > std::numeric_limits<double>::min() ? std::abs(residual) / size : residual == residual ? 0 : residual;
 }
 
-// A sum over the nodes that should vanish, less what rounding explains, relative to the terms in it. What cancels
-// within a row of an operator leaves its rounding, and the roundings of the rows add up like a random walk: `rounding`
-// is the sum of their squares, in units of eps.
-double unexplained(double sum, double terms, double rounding) {
-  const double excess = std::abs(sum) - 16 * std::numeric_limits<double>::epsilon() * std::sqrt(rounding);
-  return excess > 0 ? relative(excess, {terms}) : std::isnan(sum) ? sum : 0;
+double largest_of(std::initializer_list<double> terms) {
+  double largest = 0;
+  for (const double term : terms) largest = std::max(largest, std::abs(term));
+  return largest;
 }
 
 // Sum of |entries| of every row that this rank owns.
@@ -80,15 +78,15 @@ struct Resultant {
   static constexpr int moments = d == 2 ? 1 : 3;
   Eigen::Matrix<double, d + moments, 1> sum = Eigen::Matrix<double, d + moments, 1>::Zero();
   Eigen::Matrix<double, d + moments, 1> size = Eigen::Matrix<double, d + moments, 1>::Zero();
-  void add(const Point<d>& x, const Point<d>& f) {
-    Eigen::Matrix<double, d + moments, 1> term;
-    term.template head<d>() = f;
+  // a force at a place, and the magnitudes of its own terms
+  void add(const Point<d>& x, const Point<d>& f, double magnitude) {
+    sum.template head<d>() += f;
     if constexpr (d == 2)
-      term[2] = x[0] * f[1] - x[1] * f[0];
+      sum[2] += x[0] * f[1] - x[1] * f[0];
     else
-      term.template tail<3>() = x.cross(f);
-    sum += term;
-    size += term.cwiseAbs();
+      sum.template tail<3>() += x.cross(f);
+    size.template head<d>().array() += magnitude;
+    size.template tail<moments>().array() += x.norm() * magnitude;
   }
 };
 
@@ -103,9 +101,19 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
       surface_(surface),
       elastic_rows_(row_sizes(operators.elasticity)),
       viscous_rows_(row_sizes(operators.viscosity)),
+      expansion_rows_(row_sizes(operators.expansion)),
+      mass_rows_(row_sizes(operators.mass)),
       conduction_rows_(row_sizes(operators.conductivity)),
+      exchange_rows_(row_sizes(operators.exchange)),
+      heating_rows_(row_sizes(operators.heating)),
       unknowns_(surface.unknowns(d)),
       nodes_(surface.global_nodes()) {
+  if (operators.inertia) {  // its entries are positive
+    const VecHandle ones = layout.vector(d), sums = layout.vector(d);
+    WARMSLIP_PETSC(VecSet(ones, 1));
+    multiply(operators.inertia, ones, sums);
+    inertia_rows_ = *Values(sums);
+  }
   if (operators.viscosity) viscous_w_ = layout.vector(d);
   if (surface.points() > 0) contact_force_ = layout.vector(d);
   if (operators.conductivity) conducted_ = layout.vector(1);
@@ -119,6 +127,56 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   cooled_.resize(clamped_.size());
   for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+  supported_ = layout.sum(static_cast<double>(operators.clamped.size())) > 0;
+  interpolate_anew();
+}
+
+// The hat functions of the contact nodes at the contact points, from where the points are: the facet of the point's part
+// with its normal that it lies on, and its barycentric coordinates there. Nothing of the solver's own matrix is used, so
+// that a fault in it shows. Points come in the order of the facets, hence the search goes on from the last one.
+template <int d>
+void Bookkeeper<d>::interpolate_anew() {
+  const Mesh<d>& mesh = layout_.mesh();
+  std::map<Index, int> column;
+  for (const Index node : surface_.mesh_nodes()) column.emplace(node, static_cast<int>(column.size()));
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::Index facet = 0;
+  for (Eigen::Index q = 0; q < surface_.points(); ++q) {
+    const Facets<d>& facets = mesh.part(problem_.contacts[surface_.contact(q)].part);
+    const Point<d> x = surface_.positions().row(q).transpose(), nu = surface_.normals().row(q).transpose();
+    bool found = false;
+    for (Eigen::Index tried = 0; tried < facets.nodes.rows() && !found; ++tried, ++facet) {
+      facet %= facets.nodes.rows();
+      const Point<d> area = area_normal(mesh, facets, facet);
+      if ((area.normalized() - nu).norm() > 1e-9) continue;
+      Tensor2<d> corners;
+      for (int i = 0; i < d; ++i) corners.col(i) = mesh.nodes.row(facets.nodes(facet, i)).transpose();
+      // x = sum of b_i corner_i with sum b_i = 1, in the facet's plane
+      Eigen::Matrix<double, d, d - 1> sides;
+      for (int i = 1; i < d; ++i) sides.col(i - 1) = corners.col(i) - corners.col(0);
+      const Eigen::Matrix<double, d - 1, 1> b = sides.colPivHouseholderQr().solve(x - corners.col(0));
+      if (b.minCoeff() < -1e-9 || b.sum() > 1 + 1e-9 ||
+          (sides * b - (x - corners.col(0))).norm() > 1e-9 * sides.norm())
+        continue;
+      found = true;
+      entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, 0)), 1 - b.sum());
+      for (int i = 1; i < d; ++i) entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, i)), b[i - 1]);
+      --facet;
+    }
+    if (!found) throw std::logic_error("a contact point lies on no facet of its part");
+  }
+  shape_.resize(surface_.points(), surface_.nodes());
+  shape_.setFromTriplets(entries.begin(), entries.end());
+}
+
+// Values at the contact points, (block points), with the ledger's own interpolation.
+template <int d>
+Eigen::VectorXd Bookkeeper<d>::at_points(Vec v) const {
+  const Eigen::Index block = block_size(v);
+  const Eigen::VectorXd nodal = surface_.nodal_values(v);
+  const RealTable<Eigen::Dynamic> table =
+      shape_ * Eigen::Map<const RealTable<Eigen::Dynamic>>(nodal.data(), surface_.nodes(), block);
+  return Eigen::Map<const Eigen::VectorXd>(table.data(), table.size());
 }
 
 // Replicated nodal values into the entries `at`, relative to this rank's range, of a distributed vector.
@@ -132,6 +190,7 @@ void Bookkeeper<d>::place(const std::vector<PetscInt>& at, const Eigen::VectorXd
 template <int d>
 Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
   Ledger ledger{};
+  work_magnitude_ = 0;
   multiply(operators_.viscosity, after.w, viscous_w_);
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
@@ -144,84 +203,105 @@ Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepI
   return ledger;
 }
 
-// The contact terms, from the law at u_n and not from the solver's forces.
+// The contact terms: stored energy and friction from the forces, as a stiff law leaves no digits to its penetrations; that
+// forces and penetrations obey the law is a balance of its own.
 template <int d>
 void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
-  const Eigen::VectorXd w_points = surface_.at_points(surface_.nodal_values(after.w));
+  const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
   const ContactProblem<d> problem =
-      contact_problem(problem_, surface_, in.k, before.contact_u, after.gap, in.contact_free, in.contact_scale);
+      contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
   double stored_before = 0;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
-    const Point<d> u0 = before.contact_u.segment<d>(i * d), u1 = after.contact_u.segment<d>(i * d);
-    const double weight = surface_.weights()[i];
-    const double r1 = u1.dot(nu) - after.gap[i], r0 = u0.dot(nu) - after.gap[i], r_old = u0.dot(nu) - before.gap[i];
+    const Point<d> u0 = u0_points.segment<d>(i * d), u1 = u1_points.segment<d>(i * d);
+    const double weight = surface_.weights()[i], lambda = in.contact_force.template segment<d>(i * d).dot(nu),
+                 lambda_old = before.contact_force.template segment<d>(i * d).dot(nu);
     const ContactLaw& law = problem.law(static_cast<std::size_t>(i));
-    l.contact += weight * law.compliance.energy(r1);
-    stored_before += weight * law.compliance.energy(r_old);
-    l.gap_work += weight * (law.compliance.energy(r0) - law.compliance.energy(r_old));
-    l.contact_damping +=
-        weight * (law.compliance.energy(r0) - law.compliance.energy(r1) - law.compliance.pressure(r1) * (r0 - r1));
-    const double speed = (w - w.dot(nu) * nu).norm();
-    l.friction += in.k * friction_power(law.friction, weight * law.bound(r1, speed).value, speed);
+    const NormalCompliance& p = law.compliance;
+    const double r1 = p.penetration(lambda / weight, u1.dot(nu) - after.gap[i]),
+                 r_old = p.penetration(lambda_old / weight, u0.dot(nu) - before.gap[i]),
+                 r0 = r_old + before.gap[i] - after.gap[i];
+    l.contact += weight * p.energy(r1);
+    if (p.rigid()) {  // it stores nothing: a foundation that moves in does work, a body that comes to rest loses it
+      l.gap_work += lambda * std::max(r0, 0.0);
+      l.contact_damping += lambda * std::max(-r0, 0.0);
+    } else {
+      stored_before += weight * p.energy(r_old);
+      l.gap_work += weight * (p.energy(r0) - p.energy(r_old));
+      l.contact_damping += weight * (p.energy(r0) - p.energy(r1)) - lambda * (r0 - r1);
+    }
+    const double speed = (w - w.dot(nu) * nu).norm(), pressure = std::max(lambda, 0.0) / weight;
+    l.friction += in.k * friction_power(law.friction, weight * law.friction.bound(pressure, speed).value, speed);
+    // of the work of the force on all that its penetration is made of
+    const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
+    work_magnitude_ += std::abs(lambda) * (along(u1) + along(u0) + std::abs(after.gap[i]) + std::abs(before.gap[i]));
   }
   l.contact_change = l.contact - stored_before;
-  l.law_residual = law_residual(problem, in.contact_force, w_points, &l.law_floor);
-  place(unknowns_, surface_.to_nodes(in.contact_force), contact_force_);
-  if (!contact_heat_) return;
-  const ContactFlow flow = contact_flow(problem_, surface_, after.contact_u, w_points, after.gap);
-  const Eigen::VectorXd led = flow.conductance.cwiseProduct(after.contact_theta - in.foundation);
-  l.exchanged = in.k * led.dot(after.contact_theta);
-  l.friction_heating = in.k * flow.friction.dot(after.contact_theta);
-  place(nodes_, surface_.scalar_shape().transpose() * (led - flow.friction), contact_heat_);
+  l.law_residual = law_residual(problem, in.contact_force, w_points);
+  Eigen::VectorXd nodal(surface_.nodes() * d);
+  Eigen::Map<RealTable<d>>(nodal.data(), surface_.nodes(), d) =
+      shape_.transpose() * Eigen::Map<const RealTable<d>>(in.contact_force.data(), surface_.points(), d);
+  place(unknowns_, nodal, contact_force_);
+  if (contact_heat_) contact_heat(after, in, w_points, l);
+}
+
+// Heat that the contact conducts by its pressure and makes by friction.
+template <int d>
+void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const Eigen::VectorXd& w, Ledger& l) {
+  const Eigen::VectorXd theta = at_points(after.theta);
+  Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points());
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const ContactPart& part = problem_.contacts[surface_.contact(i)];
+    const Point<d> nu = surface_.normals().row(i).transpose(), velocity = w.template segment<d>(i * d),
+                   slip = velocity - velocity.dot(nu) * nu, force = in.contact_force.template segment<d>(i * d);
+    const double conducted = part.heat.per_pressure * std::max(force.dot(nu), 0.0) * (theta[i] - in.foundation[i]),
+                 made = part.heat.friction_share * force.dot(slip);
+    l.exchanged += in.k * conducted * theta[i];
+    l.friction_heating += in.k * made * theta[i];
+    leaving[i] = conducted - made;
+  }
+  place(nodes_, shape_.transpose() * leaving, contact_heat_);
 }
 
 // Momentum tested with k w_n.
 template <int d>
 void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const double kinetic_before = 0.5 * dot(before.w, before.momentum),
-               elastic_before = 0.5 * dot(before.u, before.elastic_u);
+               elastic_before = 0.5 * dot(before.shape(), before.elastic_u);
   l.kinetic = 0.5 * dot(after.w, after.momentum);
-  l.elastic = 0.5 * dot(after.u, after.elastic_u);
+  l.elastic = 0.5 * dot(after.shape(), after.elastic_u);
   l.kinetic_change = l.kinetic - kinetic_before;
   l.elastic_change = l.elastic - elastic_before;
   l.inertia_damping = 0.5 * dot_of_changes(layout_, after.w, before.w, after.momentum, before.momentum);
-  l.elastic_damping = 0.5 * dot_of_changes(layout_, after.u, before.u, after.elastic_u, before.elastic_u);
+  l.elastic_damping = 0.5 * dot_of_changes(layout_, after.shape(), before.shape(), after.elastic_u, before.elastic_u);
   l.viscous = in.k * dot(after.w, viscous_w_);
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
   const double contact_before = l.contact - l.contact_change;
-  const std::initializer_list<double> terms{
-      l.kinetic,  kinetic_before, l.elastic,        elastic_before, l.contact,      contact_before, l.viscous,
-      l.friction, l.load_work,    l.expansion_work, l.gap_work,     l.support_work, work_size_};
-  // the law's pressure, with its rounding, enters four terms: stored before and after, damping, friction
-  const double touching = std::max({l.contact, contact_before, l.contact_damping, l.friction, std::abs(l.gap_work)});
-  l.energy_floor = touching > 0 ? 4 * l.law_floor * relative(touching, terms) : 0;
   const double sum = l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
                      l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work -
                      l.support_work;
-  l.energy_residual = relative(sum, terms);
-  // what rounding hides of the forces it hides of their work; where there are none, the work is all rounding
-  if (acted_on_)
-    l.energy_floor += 16 * l.force_floor;
-  else
-    l.energy_residual = unexplained(sum, *std::max_element(terms.begin(), terms.end()), work_rounding_);
+  l.energy_residual = relative(
+      sum, largest_of({l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before, l.viscous,
+                       l.friction, l.load_work, l.expansion_work, l.gap_work, l.support_work}) +
+               work_magnitude_);
 }
 
-// Force and moment (v rigid), and the equation of motion at every free node: the supports' reactions are the residuals
-// of the fixed rows.
+// The equation of motion at every free node, force and moment: the supports' reactions are the residuals of the fixed
+// rows.
 template <int d>
 void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
-  double force_rounding = 0, moment_rounding = 0, work_rounding = 0, work_size = 0;
-  // largest over the nodes: what the equation leaves over, the size of its terms, the forces in it and those applied
-  enum { motion, motion_size, forces_here, applied, internal_size };
-  std::array<double, 5> most{};
+  double work = 0;
+  enum { defect, backward, acting };
+  std::array<double, 3> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double u = largest(after.u), w = largest(after.w);
+  const double u = std::max(largest(after.u), largest(before.u)), w = largest(after.w),
+               w_both = std::max(w, largest(before.w)), theta = largest(in.coupling_theta);
   {
-    Values m1(after.momentum), m0(before.momentum), f(in.force), e(after.elastic_u), b(viscous_w_),
-        g(in.expansion_theta), c(contact_force_), velocity(after.w), displacement(after.u);
+    Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
+        b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
+        s0(before.shape());
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const Point<d> position =
           layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
@@ -229,50 +309,39 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         return v.size() ? Point<d>(v.template segment<d>(i * d)) : Point<d>(Point<d>::Zero());
       };
       const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
-                     elastic = at(*e), viscous = at(*b), expansion = at(*g);
-      force.add(position, inertia);
-      force.add(position, -load);
-      force.add(position, contact_here);
-      const Point<d> internal = at(elastic_rows_) * u + at(viscous_rows_) * w + expansion.cwiseAbs();
-      force_rounding += internal.squaredNorm();
-      work_size += in.k * load.norm() * at(*velocity).norm();
-      const Point<d> way = at(*displacement).cwiseAbs() + in.k * at(*velocity).cwiseAbs();
-      work_rounding += std::pow(way.dot(internal), 2);
-      moment_rounding += internal.squaredNorm() * position.squaredNorm();
-      const Point<d> left = inertia - load + contact_here + viscous + elastic - expansion;
+                     elastic = at(*e1), viscous = at(*b), expansion = at(*g), way = at(*velocity);
+      const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
+      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs();
+      const Point<d> moved = (p1.cwiseAbs() + p0.cwiseAbs() + w_both * at(inertia_rows_)) / in.k;
+      const Point<d> magnitude =
+          moved + given + u * at(elastic_rows_) + w * at(viscous_rows_) + theta * at(expansion_rows_);
       if (clamped_[static_cast<std::size_t>(i)]) {
-        force.add(position, -left);
-        l.support_work += in.k * left.dot(at(*velocity));
-        work_size += in.k * left.norm() * at(*velocity).norm();
+        force.add(position, external - left, magnitude.maxCoeff());
+        l.support_work += in.k * left.dot(way);
       } else {
-        raise(motion, left.cwiseAbs().maxCoeff());
+        // inner forces cancel in the sum over a body
+        force.add(position, external, (supported_ ? magnitude : Point<d>(moved + given)).maxCoeff());
+        raise(defect, left.cwiseAbs().maxCoeff());
+        for (int a = 0; a < d; ++a)
+          if (magnitude[a] > std::numeric_limits<double>::min()) raise(backward, std::abs(left[a]) / magnitude[a]);
+        if (!left.allFinite()) raise(backward, std::numeric_limits<double>::infinity());
       }
-      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs() + expansion.cwiseAbs();
-      raise(motion_size, ((p1.cwiseAbs() + p0.cwiseAbs()) / in.k + given + internal).maxCoeff());
-      raise(applied, given.maxCoeff());
-      raise(forces_here, (given + elastic.cwiseAbs() + viscous.cwiseAbs()).maxCoeff());
-      raise(internal_size, internal.maxCoeff());
+      work += magnitude.dot(Point<d>(in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()));
+      raise(acting, std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(),
+                              at(*e0).cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff(),
+                              expansion.cwiseAbs().maxCoeff()}));
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
                         sizes = layout_.sum(Eigen::VectorXd(force.size));
-  const double forces = sizes.head(d).maxCoeff(), moments = sizes.tail(sizes.size() - d).maxCoeff();
-  force_rounding = layout_.sum(force_rounding);
-  moment_rounding = layout_.sum(moment_rounding);
-  work_rounding_ = layout_.sum(work_rounding);
-  work_size_ = layout_.sum(work_size);
+  work_magnitude_ += layout_.sum(work);
   l.support_work = layout_.sum(l.support_work);
-  for (Eigen::Index i = 0; i < sums.size(); ++i)
-    l.force_residual = std::max(l.force_residual, i < d ? unexplained(sums[i], forces, force_rounding)
-                                                        : unexplained(sums[i], moments, moment_rounding));
-  // sums say nothing about the equations behind them: those of all free nodes hold as well, in size relative to the
-  // largest
   most = over_ranks(layout_.comm(), most);
-  l.force_residual = std::max(l.force_residual, relative(most[motion], {most[motion_size]}));
-  // without any load there is nothing a strain of rounding could be mistaken for
-  acted_on_ = most[applied] > 0;
-  if (acted_on_)
-    l.force_floor = std::numeric_limits<double>::epsilon() * relative(most[internal_size], {most[forces_here]});
+  l.force_residual = most[backward];
+  for (Eigen::Index i = 0; i < sums.size(); ++i)
+    l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
+  l.force_defect = relative(most[defect], most[acting]);
+  l.force_scale = most[acting];
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.
@@ -280,30 +349,34 @@ template <int d>
 void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
                stored = 0.5 * dot(after.theta, after.mass_theta);
-  double content = 0, content_size = 0, rounding = 0;
-  enum { left_over, size };
-  std::array<double, 2> most{};
-  const double theta = largest(after.theta);
+  double content = 0, content_size = 0, work = 0;
+  enum { defect, backward, acting };
+  std::array<double, 3> most{};
+  const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
+  const double theta = largest(after.theta), both = std::max(theta, largest(before.theta)),
+               w = std::max(largest(after.w), largest(before.w));
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
-        c(contact_heat_), values(after.theta);
+        c(contact_heat_), values(after.theta), old(before.theta);
     const auto at = [](auto&& v, PetscInt i) { return v.size() ? v[i] : 0.0; };
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
-      const double storage = ((*t1)[i] - (*t0)[i]) / in.k, supply = at(*q, i), heating = at(*h, i);
-      const double exchange = at(*x, i) + at(*c, i), source = supply + heating;
-      content += storage + exchange - source;
-      content_size += std::abs(storage) + std::abs(exchange) + std::abs(source);
-      const double within = conduction_rows_[i] * theta + (std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k;
-      rounding += within * within;
-      const double wall = storage + exchange - source + (*flux)[i];
+      const double storage = ((*t1)[i] - (*t0)[i]) / in.k, supply = at(*q, i), heating = at(*h, i),
+                   exchange = at(*x, i) + at(*c, i);
+      const double external = storage + exchange - supply - heating, wall = external + (*flux)[i];
+      const double given = std::abs(exchange) + std::abs(supply) + std::abs(heating);
+      const double magnitude = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
+                               theta * at(exchange_rows_, i) + w * at(heating_rows_, i);
+      content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
+      content_size += magnitude;
       if (cooled_[static_cast<std::size_t>(i)]) {
-        content -= wall;
-        content_size += std::abs(wall);
         l.held += in.k * wall * (*values)[i];
       } else {
-        most[left_over] = std::max(most[left_over], std::abs(wall));
+        raise(defect, std::abs(wall));
+        if (magnitude > std::numeric_limits<double>::min()) raise(backward, std::abs(wall) / magnitude);
+        if (!std::isfinite(wall)) raise(backward, std::numeric_limits<double>::infinity());
       }
-      most[size] = std::max(most[size], within + std::abs(exchange) + std::abs(supply) + std::abs(heating));
+      work += in.k * magnitude * (std::abs((*values)[i]) + std::abs((*old)[i]));
+      raise(acting, std::max({(std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k, std::abs((*flux)[i]), given}));
     }
   }
   l.held = layout_.sum(l.held);
@@ -313,38 +386,48 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   l.exchanged += in.k * dot(after.theta, exchanged_);
   l.supplied = in.k * dot(in.heat, after.theta);
   l.heating = in.k * dot(in.heating_w, after.theta);
-  l.heat_residual = relative(
-      l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating - l.friction_heating - l.held,
-      {stored, stored_before, l.heat_damping, l.conducted, l.exchanged, l.supplied, l.heating, l.friction_heating,
-       l.held});
+  const double sum = l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating -
+                     l.friction_heating - l.held;
   most = over_ranks(layout_.comm(), most);
-  l.heat_residual =
-      std::max({l.heat_residual, unexplained(layout_.sum(content), layout_.sum(content_size), layout_.sum(rounding)),
-                relative(most[left_over], {most[size]})});
+  l.heat_residual = std::max({most[backward], relative(layout_.sum(content), layout_.sum(content_size)),
+                              relative(sum, largest_of({stored, stored_before, l.heat_damping, l.conducted, l.exchanged,
+                                                        l.supplied, l.heating, l.friction_heating, l.held}) +
+                                                layout_.sum(work))});
+  l.heat_defect = relative(most[defect], most[acting]);
 }
 
 template <int d>
-void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
+void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
+                                    Vec external) const {
   WARMSLIP_PETSC(VecCopy(in.force, out));
+  add(out, -1, contact_force_);
+  if (after.momentum) {
+    Values values(out), m1(after.momentum), m0(before.momentum);
+    *values -= (*m1 - *m0) / in.k;
+  }
+  if (external) WARMSLIP_PETSC(VecCopy(out, external));
   add(out, 1, in.expansion_theta);
   add(out, -1, viscous_w_);
   add(out, -1, after.elastic_u);
-  add(out, -1, contact_force_);
-  Values values(out), m1(after.momentum), m0(before.momentum);
-  if (after.momentum) *values -= (*m1 - *m0) / in.k;
+  Values values(out);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     if (clamped_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
 }
 
 template <int d>
-void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out) const {
+void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
+                                Vec external) const {
   WARMSLIP_PETSC(VecCopy(in.heat, out));
   add(out, 1, in.heating_w);
-  add(out, -1, conducted_);
   add(out, -1, exchanged_);
   add(out, -1, contact_heat_);
-  Values values(out), m1(after.mass_theta), m0(before.mass_theta);
-  *values -= (*m1 - *m0) / in.k;
+  {
+    Values values(out), m1(after.mass_theta), m0(before.mass_theta);
+    *values -= (*m1 - *m0) / in.k;
+  }
+  if (external) WARMSLIP_PETSC(VecCopy(out, external));
+  add(out, -1, conducted_);
+  Values values(out);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
 }

@@ -9,6 +9,9 @@ namespace warmslip {
 namespace {
 
 constexpr const char* beyond_doubles = "a number overflowed; scale the data";
+constexpr const char* unsupported =
+    "nothing holds the body in a step without inertia: it may move and touches nothing, or slides freely on what it "
+    "touches; give it a support, friction or an [inertia] table";
 
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>
@@ -17,13 +20,28 @@ StepReport<d> not_taken(Outcome outcome, const std::string& reason) {
   report.outcome = outcome;
   report.reason = reason;
   Ledger& l = report.ledger;
-  for (double* unknown : {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.law_floor,
-                          &l.energy_floor, &l.force_floor})
+  for (double* unknown : {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.force_defect,
+                          &l.heat_defect})
     *unknown = std::numeric_limits<double>::quiet_NaN();
   return report;
 }
 
+double largest_entry(Vec v) {
+  PetscReal value = 0;
+  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+  return value;
+}
+
+double largest_entry(const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
+
 }  // namespace
+
+double Errors::largest() const {
+  double worst = 0;
+  for (const double error : {u, theta, stress, contact_force})
+    if (error > worst) worst = error;
+  return worst;
+}
 
 template <int d>
 void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time) {
@@ -40,68 +58,157 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   time_ = time;
   if (now_.heating_w) multiply(operators_.heating, now_.w, now_.heating_w);
   products(now_);
+  forget();
 }
 
 template <int d>
 void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status) {
   if (contact_force.size() != contact_force_.size() || status.size() != status_.size())
     throw std::invalid_argument("contact forces and statuses need one entry a contact point");
-  contact_force_ = contact_force;
+  contact_force_ = now_.contact_force = contact_force;
   status_ = status;
   forget();
 }
 
+// A run that goes on knows u alone.
 template <int d>
 void Stepper<d>::forget() {
   if (contact_) contact_->forget();
+  if (!now_.strained) return;
+  WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
+  rigid_.remove(now_.strained);
+  products(now_);
+}
+
+// What the balances read of a step beside its two levels.
+template <int d>
+StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& contact) const {
+  return {options_.k,
+          loads.force,
+          loads.heat,
+          monolithic() ? next_.expansion_theta : now_.expansion_theta,
+          options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w,
+          monolithic() ? next_.theta : now_.theta,
+          contact.force,
+          free_,
+          loads.foundation};
 }
 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.
 template <int d>
 StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>& contact) {
   if (next_.w) WARMSLIP_PETSC(VecWAXPY(next_.u, options_.k, next_.w, now_.u));
+  if (next_.strained) WARMSLIP_PETSC(VecWAXPY(next_.strained, options_.k, strained_w_, now_.strained));
   next_.gap = loads.gap;
-  const Vec heating_w = options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w;
+  if (contact_) next_.contact_force = contact.force;
   if (next_.heating_w) multiply(operators_.heating, next_.w, next_.heating_w);  // before the heat that may ask for it
-  if (heat_) solve_heat(loads, heating_w);
+  if (heat_) solve_heat(loads, options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w);
   products(next_);
-  const Vec expansion_theta = monolithic() ? next_.expansion_theta : now_.expansion_theta;
-  return {options_.k,      loads.force,   loads.heat, expansion_theta,
-          heating_w,       contact.force, free_,      contact_ ? contact_->scale(free_) : 0,
-          loads.foundation};
+  return inputs(loads, contact);
+}
+
+// Notes a change as a field's error relative to its largest value so far.
+template <int d>
+void Stepper<d>::note(double& error, double& scale, double change, double size) {
+  scale = std::max(scale, size);
+  error = scale > 0 ? change / scale : 0;
 }
 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
-// solved again with the free velocity it corrects. Needed where K is ill-conditioned: large steps on fine meshes.
+// solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
 template <int d>
-bool Stepper<d>::refine(const StepLoads& loads, const StepInputs& inputs, ContactSolution<d>& contact) {
+bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact,
+                                bool apply) {
   const bool monolithic = this->monolithic();
-  books_.momentum_defect(now_, next_, inputs, momentum_right_);
+  const StepInputs inputs = this->inputs(loads, contact);
+  books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
   if (monolithic) {
     books_.heat_defect(now_, next_, inputs, heat_right_);
     join(momentum_right_, heat_right_, coupled_right_);
   }
-  const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_);
-  ContactSolution<d> again;
-  again.converged = true;
-  const Eigen::VectorXd before = contact.force;
+  const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
+  ContactSolution<d> change;
   if (contact_) {
     const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
-    free_ = velocity + contact_->compliance() * before + correction;
-    if (!solve_contact(loads, free_, before, again)) return false;
+    const Eigen::VectorXd free = velocity + contact_->compliance() * contact.force + correction;
+    ContactSolution<d> again;
+    if (!rigid_.empty()) rigid_load_ += contact_->coupling().motions.transpose() * contact.force;
+    if (!solve_contact(loads, free, contact.force, again)) return false;
+    if (apply) free_ = free;
+    change = again;
+    change.force -= contact.force;
+    again.iterations += contact.iterations;
+    again.stage = std::max(again.stage, contact.stage);
+    if (apply) contact = std::move(again);
   }
-  momentum_->expand(contact_ ? surface_.to_nodes(again.force - before) : Eigen::VectorXd(),
-                    monolithic ? coupled_ : correction_w_);
+  expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
   if (monolithic) {
     split(coupled_, correction_w_, correction_theta_);
-    WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+    note(errors_.theta, scales_.theta, largest_entry(correction_theta_), largest_entry(next_.theta));
+    if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
   }
-  WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
-  again.iterations += contact.iterations;
-  again.stage = std::max(again.stage, contact.stage);
-  contact = std::move(again);
-  ++cost_.refinements;
+  note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
+       std::max(largest_entry(next_.u), largest_entry(now_.u)));
+  if (next_.elastic_u) {
+    multiply(operators_.elasticity, correction_strained_ ? correction_strained_ : correction_w_, momentum_right_);
+    note(errors_.stress, scales_.stress, options_.k * largest_entry(momentum_right_), ledger.force_scale);
+  }
+  if (contact_)
+    note(errors_.contact_force, scales_.contact_force, largest_entry(change.force),
+         std::max(largest_entry(contact.force), ledger.force_scale));
+  if (apply) {
+    WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
+    if (strained_w_) WARMSLIP_PETSC(VecAXPY(strained_w_, 1, correction_strained_));
+  }
   return true;
+}
+
+template <int d>
+void Stepper<d>::correct_heat(const StepInputs& inputs, bool apply) {
+  books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  solve_heat(heat_right_, heat_external_, Eigen::VectorXd::Zero(given_flow_.size()), correction_theta_);
+  note(errors_.theta, scales_.theta, largest_entry(correction_theta_), largest_entry(next_.theta));
+  if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+}
+
+// Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
+template <int d>
+Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
+  const double enough = options_.refinement;
+  const auto motion = [&] {
+    return std::max({ledger.force_defect, ledger.law_residual, monolithic() ? ledger.heat_defect : 0.0});
+  };
+  bool refined = false, warmed = false;
+  for (int pass = 0; momentum_ && pass < options_.passes && motion() > enough; ++pass) {
+    const double before = motion();
+    if (!correct_motion(loads, ledger, contact, true)) break;
+    ledger = balance(complete(loads, contact));
+    ++cost_.refinements;
+    refined = true;
+    if (!(motion() < 0.5 * before)) break;
+  }
+  for (int pass = 0; heat_ && pass < options_.passes && ledger.heat_defect > enough; ++pass) {
+    const double before = ledger.heat_defect;
+    correct_heat(inputs(loads, contact), true);
+    products(next_);
+    ledger = balance(inputs(loads, contact));
+    ++cost_.refinements;
+    warmed = true;
+    if (!(ledger.heat_defect < 0.5 * before)) break;
+  }
+  if (!measured_now()) return ledger;
+  if (momentum_ && !refined) correct_motion(loads, ledger, contact, false);
+  if (heat_ && !warmed) correct_heat(inputs(loads, contact), false);
+  return ledger;
+}
+
+// Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run
+// that goes on measures the same ones.
+template <int d>
+bool Stepper<d>::measured_now() const {
+  for (double step = 1, n = std::round(time_ / options_.k) + 1; step <= n; step *= options_.measured_steps)
+    if (step == n) return true;
+  return false;
 }
 
 template <int d>
@@ -113,34 +220,37 @@ Ledger Stepper<d>::balance(const StepInputs& inputs) {
 // Only a step that closes its books becomes the state.
 template <int d>
 Outcome Stepper<d>::judge(const Ledger& l) const {
-  const double bound = options_.identity_bound;
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.viscous + l.load_work + l.conducted + l.heat_change))
     return Outcome::not_finite;
-  if (!(std::max(l.law_floor, l.force_floor) <= options_.floor_bound)) return Outcome::precision_lost;
-  const bool closed = l.heat_residual <= bound && l.force_residual <= bound &&
-                      l.energy_residual <= bound + l.energy_floor && l.law_residual <= bound + l.law_floor;
-  return closed ? Outcome::right : Outcome::identity_violated;
+  const double bound = options_.identity_bound;
+  const bool closed = l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound &&
+                      l.law_residual <= bound;
+  if (!closed) return Outcome::identity_violated;
+  return errors_.largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
 }
 
 // What a step that is not right is told of.
 template <int d>
 std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
   const double bound = options_.identity_bound;
+  std::string names;
+  const auto list = [&](const char* name) { names += (names.empty() ? "" : " and ") + std::string(name); };
   switch (outcome) {
     case Outcome::not_finite:
       return beyond_doubles;
     case Outcome::precision_lost:
-      return l.law_floor <= options_.floor_bound
-                 ? "the body moves so far that rounding hides its strain; describe it from a frame that moves along"
-                 : "rounding hides the contact pressure; lower contact.stiffness or bring the body nearer";
+      for (const auto& [name, error] : {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta},
+                                        std::pair{"the elastic forces", errors_.stress},
+                                        std::pair{"the contact force", errors_.contact_force}})
+        if (error > options_.error_bound) list(name);
+      return "fewer than four digits of " + names +
+             " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for double "
+             "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other";
     case Outcome::identity_violated: {
-      std::string names;
-      for (const auto& [name, open] :
-           {std::pair{"energy", !(l.energy_residual <= bound + l.energy_floor)},
-            std::pair{"heat", !(l.heat_residual <= bound)}, std::pair{"force", !(l.force_residual <= bound)},
-            std::pair{"law", !(l.law_residual <= bound + l.law_floor)}})
-        if (open) names += (names.empty() ? "" : " and ") + std::string(name);
-      return names + " stays open: the linear solver is loose, or rounding takes the digits";
+      for (const auto& [name, residual] : {std::pair{"energy", l.energy_residual}, std::pair{"heat", l.heat_residual},
+                                           std::pair{"force", l.force_residual}, std::pair{"law", l.law_residual}})
+        if (!(residual <= bound)) list(name);
+      return names + " stays open: the linear solver is loose, and refinement does not mend it";
     }
     default:
       return "";
@@ -168,40 +278,22 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     return (momentum_ ? momentum_->substitutions() : 0) + (heat_ ? heat_->substitutions() : 0);
   };
   const int before = substitutions();
+  errors_ = {};
   ContactSolution<d> contact;
-  if (momentum_) {
-    {
-      const Timed part(cost_.momentum_seconds);
-      momentum_right_side(loads);
-      if (monolithic()) {
-        heat_right_side(loads, nullptr, coupled_scale_);
-        join(momentum_right_, heat_right_, coupled_right_);
-      }
-      free_ = reduce(monolithic() ? coupled_right_ : momentum_right_);
-    }
+  if (momentum_ && !solve_motion(loads, contact)) {
     const bool finite = layout_.sum(free_.allFinite() ? 0.0 : 1.0) == 0;
-    if (contact_ && (!finite || !solve_contact(loads, free_, contact_force_, contact))) {
-      StepReport<d> report = finite ? not_taken<d>(Outcome::contact_not_converged,
-                                                   "no stage of the contact solver reached the law; take smaller steps")
-                                    : not_taken<d>(Outcome::not_finite, beyond_doubles);
-      report.stage = contact.stage;
-      report.newton_iterations = contact.iterations;
-      if (finite) report.ledger.law_residual = contact.law_residual;
-      return report;
-    }
-    const Timed part(cost_.momentum_seconds);
-    momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(),
-                      monolithic() ? coupled_ : next_.w);
-    if (monolithic()) split(coupled_, next_.w, next_.theta);
+    StepReport<d> report =
+        !finite               ? not_taken<d>(Outcome::not_finite, beyond_doubles)
+        : contact.unsupported ? not_taken<d>(Outcome::unsupported, unsupported)
+                              : not_taken<d>(Outcome::contact_not_converged,
+                                             "no stage of the contact solver reached the law; take smaller steps");
+    report.stage = contact.stage;
+    report.newton_iterations = contact.iterations;
+    if (finite) report.ledger.law_residual = contact.law_residual;
+    return report;
   }
   const StepInputs inputs = complete(loads, contact);
-  Ledger ledger = balance(inputs);
-  if (momentum_ &&
-      std::max({ledger.energy_residual, ledger.force_residual, monolithic() ? ledger.heat_residual : 0.0}) >
-          options_.refinement &&
-      refine(loads, inputs, contact))
-    ledger = balance(complete(loads, contact));
-  StepReport<d> report = conclude(loads, ledger, contact);
+  StepReport<d> report = conclude(loads, refine(loads, balance(inputs), contact), contact);
   if (report.outcome == Outcome::right) cost_.substitutions += substitutions() - before;
   return report;
 }
@@ -211,6 +303,7 @@ template <int d>
 StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact) {
   StepReport<d> report;
   report.ledger = ledger;
+  report.errors = errors_;
   report.outcome = judge(ledger);
   report.reason = why(report.outcome, ledger);
   if (report.outcome != Outcome::right) return report;

@@ -16,68 +16,108 @@ Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Op
   if (!(options.k > 0) || !std::isfinite(options.k))
     throw std::invalid_argument("the time step must be positive and finite");
   const Timed timed(cost_.setup_seconds);
-  const bool moves = problem.moves(), conducts = problem.conducts();
-  if (!moves && !conducts) throw std::invalid_argument("a problem needs motion or heat");
-  if (options.coupling == Coupling::monolithic && moves && conducts) {
-    if (problem.contact_heats())
-      throw std::invalid_argument("heat that the contact makes or leads needs the staggered or the lagged coupling");
-    auto [scale, symmetry] = coupled_symmetry(problem);
-    coupled_scale_ = scale;
-    const MatHandle a = coupled_matrix(layout, problem, operators, options.k, scale);
-    momentum_ = factor(a, surface.unknowns(d + 1), symmetry, d + 1, "coupled", options.backend);
-    coupled_right_ = layout.vector(d + 1);
-    coupled_ = layout.vector(d + 1);
-  } else {
-    if (moves) {
-      const MatHandle a = momentum_matrix(layout, problem, operators, options.k);
-      momentum_ = factor(a, surface.unknowns(d), Symmetry::positive_definite, d, "momentum", options.backend);
-    }
-    if (conducts) {
-      const MatHandle h = heat_matrix(operators, options.k);
-      const auto apart = problem.contact_heats() ? surface.global_nodes() : std::vector<PetscInt>{};
-      heat_ = factor(h, apart, problem.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,
-                     "heat", options.backend);
-    }
+  if (!problem.moves() && !problem.conducts()) throw std::invalid_argument("a problem needs motion or heat");
+  try {
+    take_factors();
+  } catch (const SolveFailed& failure) {  // before the first step: refused
+    throw std::invalid_argument(failure.what());
   }
-  if (surface.points() > 0) {
-    ContactOptions contact = options.contact;
-    // more contact points than nodes: sticking forces are shared in many ways, see ContactSolver::factor and
-    // share_least
-    if (surface.points() > surface.nodes()) contact.proximal = 1e-8;
-    try {
-      contact_ = std::make_unique<ContactSolver<d>>(surface.at_points(momentum_->compliance()), contact);
-    } catch (const SolveFailed& failure) {  // before the first step: refused
-      throw std::invalid_argument(failure.what());
-    }
-  }
-  for (Level* level : {&now_, &next_}) {
-    if (moves) {
-      level->u = layout.vector(d);
-      level->w = layout.vector(d);
-    }
-    if (conducts) {
-      level->theta = layout.vector(1);
-      level->mass_theta = layout.vector(1);
-    }
-    if (operators.inertia) level->momentum = layout.vector(d);
-    if (operators.elasticity) level->elastic_u = layout.vector(d);
-    if (operators.expansion && moves) level->expansion_theta = layout.vector(d);
-    if (operators.heating && moves) level->heating_w = layout.vector(1);
-  }
-  if (moves)
-    for (VecHandle* v : {&momentum_right_, &correction_w_}) *v = layout.vector(d);
-  if (conducts)
-    for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout.vector(1);
-  if (reactive()) {
-    Eigen::VectorXd held = Eigen::VectorXd::Zero(layout.mesh().nodes.rows());
-    for (const PetscInt i : operators.cooled) held[i] = 1;
-    held = layout.sum(std::move(held));
-    for (const PetscInt i : surface.global_nodes()) fixed_contact_.push_back(held[i] > 0);
-  }
-  contact_force_ = Eigen::VectorXd::Zero(surface.points() * d);
-  status_.assign(static_cast<std::size_t>(surface.points()), Status::open);
+  take_vectors();
   cost_.factorizations = (momentum_ ? 1 : 0) + (heat_ ? 1 : 0);
   cost_.factor_bytes = (momentum_ ? momentum_->bytes() : 0) + (heat_ ? heat_->bytes() : 0);
+}
+
+template <int d>
+void Stepper<d>::take_factors() {
+  const double k = options_.k;
+  const bool moves = problem_.moves(), conducts = problem_.conducts();
+  if (options_.coupling == Coupling::monolithic && moves && conducts) {
+    if (problem_.contact_heats())
+      throw std::invalid_argument("heat that the contact makes or leads needs the staggered or the lagged coupling");
+    auto [scale, symmetry] = coupled_symmetry(problem_);
+    coupled_scale_ = scale;
+    const MatHandle a = coupled_matrix(layout_, problem_, operators_, k, scale);
+    momentum_ = factor(a, surface_.unknowns(d + 1), symmetry, d + 1, "coupled", options_.backend);
+  } else {
+    std::vector<std::string> touching, exchanging;
+    for (const ContactPart& contact : problem_.contacts) {
+      if (contact.law) touching.push_back(contact.part);
+      exchanging.push_back(contact.part);
+    }
+    if (moves) {
+      const MatHandle a = momentum_matrix(layout_, problem_, operators_, k);
+      if (operators_.elasticity || operators_.viscosity)
+        rigid_ = RigidMotions(layout_, d, problem_.clamped, touching);
+      if (!rigid_.empty()) rigid_.add_springs(a);
+      momentum_ = factor(a, surface_.unknowns(d), Symmetry::positive_definite, d, "momentum", options_.backend);
+      if (!rigid_.empty())
+        rigid_.prepare(*momentum_, [&](Vec x, Vec y) {
+          multiply(operators_.inertia, x, y);
+          WARMSLIP_PETSC(VecScale(y, 1 / k));
+        });
+    }
+    if (conducts) {
+      const MatHandle h = heat_matrix(operators_, k);
+      constants_ = RigidMotions(layout_, 1, problem_.cooled, exchanging);
+      if (!constants_.empty()) constants_.add_springs(h);
+      const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
+      heat_ = factor(h, apart, problem_.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,
+                     "heat", options_.backend);
+      if (!constants_.empty())
+        constants_.prepare(*heat_, [&](Vec x, Vec y) {
+          if (operators_.exchange) WARMSLIP_PETSC(MatMult(operators_.exchange, x, y));
+          const VecHandle stored = duplicate(y);
+          WARMSLIP_PETSC(MatMult(operators_.mass, x, stored));
+          WARMSLIP_PETSC(VecAXPY(y, 1 / k, stored));
+        });
+    }
+  }
+  if (surface_.points() == 0) return;
+  ContactOptions contact = options_.contact;
+  // more contact points than nodes: sticking forces are shared in many ways, see ContactSolver::factor and share_least
+  if (surface_.points() > surface_.nodes()) contact.proximal = 1e-8;
+  RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), rigid_.inertia()};
+  for (Eigen::Index j = 0; j < rigid_.count(); ++j)
+    apart.motions.col(j) = surface_.at_points(surface_.nodal_values(rigid_.along(j)));
+  contact_ = std::make_unique<ContactSolver<d>>(surface_.at_points(momentum_->compliance()), contact, std::move(apart));
+}
+
+template <int d>
+void Stepper<d>::take_vectors() {
+  const bool moves = problem_.moves(), conducts = problem_.conducts();
+  for (Level* level : {&now_, &next_}) {
+    if (moves) {
+      level->u = layout_.vector(d);
+      level->w = layout_.vector(d);
+    }
+    if (conducts) {
+      level->theta = layout_.vector(1);
+      level->mass_theta = layout_.vector(1);
+    }
+    if (operators_.inertia) level->momentum = layout_.vector(d);
+    if (operators_.elasticity) level->elastic_u = layout_.vector(d);
+    if (!rigid_.empty()) level->strained = layout_.vector(d);
+    if (operators_.expansion && moves) level->expansion_theta = layout_.vector(d);
+    if (operators_.heating && moves) level->heating_w = layout_.vector(1);
+    level->contact_force = Eigen::VectorXd::Zero(surface_.points() * d);
+  }
+  if (moves)
+    for (VecHandle* v : {&momentum_right_, &correction_w_}) *v = layout_.vector(d);
+  if (conducts)
+    for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout_.vector(1);
+  if (!rigid_.empty())
+    for (VecHandle* v : {&momentum_external_, &strained_w_, &correction_strained_}) *v = layout_.vector(d);
+  if (!constants_.empty()) heat_external_ = layout_.vector(1);
+  if (moves && conducts && options_.coupling == Coupling::monolithic)
+    for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);
+  if (reactive()) {
+    Eigen::VectorXd held = Eigen::VectorXd::Zero(layout_.mesh().nodes.rows());
+    for (const PetscInt i : operators_.cooled) held[i] = 1;
+    held = layout_.sum(std::move(held));
+    for (const PetscInt i : surface_.global_nodes()) fixed_contact_.push_back(held[i] > 0);
+  }
+  contact_force_ = Eigen::VectorXd::Zero(surface_.points() * d);
+  status_.assign(static_cast<std::size_t>(surface_.points()), Status::open);
 }
 
 template class Stepper<2>;

@@ -18,11 +18,10 @@ void subtract(Mat a, double factor, Vec x, Vec scratch, Vec out) {
 template <int d>
 void Stepper<d>::products(Level& level) const {
   multiply(operators_.inertia, level.w, level.momentum);
-  multiply(operators_.elasticity, level.u, level.elastic_u);
+  if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
   multiply(operators_.mass, level.theta, level.mass_theta);
   if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
-  if (reactive()) level.contact_theta = surface_.scalar_shape() * surface_.nodal_values(level.theta);
 }
 
 // The fixed entries of a right-hand side: scale times the given ones, or zero.
@@ -41,6 +40,7 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads) {
   const Vec out = momentum_right_;
   WARMSLIP_PETSC(VecCopy(loads.force, out));
   if (now_.momentum) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
+  if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
   if (now_.elastic_u) WARMSLIP_PETSC(VecAXPY(out, -1, now_.elastic_u));
   if (!monolithic() && now_.expansion_theta) WARMSLIP_PETSC(VecAXPY(out, 1, now_.expansion_theta));
   const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_w_, out); };
@@ -70,11 +70,22 @@ void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double s
   fix(out, operators_.cooled, loads.support_temperature, 1 / scale);
 }
 
-// The free velocities of the contact points for a right-hand side, which is remembered.
+// The free velocities of the contact points for a right-hand side, which is remembered with the load on the motions that
+// are solved for apart; `external` is the part of it that acts on those.
 template <int d>
-Eigen::VectorXd Stepper<d>::reduce(Vec right) {
+Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   const Eigen::VectorXd nodal = momentum_->reduce(right);
+  if (!rigid_.empty()) rigid_load_ = rigid_.load(external, right);
   return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
+}
+
+// The solution for the right-hand side of the last `reduce` and the forces of the contact; `strained` receives it but for a
+// rigid motion, where such are solved for apart.
+template <int d>
+void Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, Vec strained) {
+  const bool apart = !rigid_.empty();
+  momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), apart ? strained : out);
+  if (apart) rigid_.add(contact_ ? contact.rigid : rigid_.alone(rigid_load_), strained, out);
 }
 
 template <int d>
@@ -82,46 +93,103 @@ bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& fr
                                ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
   const ContactProblem<d> problem =
-      contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free, contact_->scale(free));
+      contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free, rigid_load_);
   solution = contact_->solve(problem, guess);
   if (solution.converged && surface_.points() > surface_.nodes())
     share_least(problem, surface_.scalar_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
-  int converged = solution.converged;
-  MPI_Bcast(&converged, 1, MPI_INT, 0, layout_.comm());
-  solution.converged = converged != 0;
+  MPI_Bcast(solution.rigid.data(), static_cast<int>(solution.rigid.size()), MPI_DOUBLE, 0, layout_.comm());
+  int found[] = {solution.converged, solution.unsupported};
+  MPI_Bcast(found, 2, MPI_INT, 0, layout_.comm());
+  solution.converged = found[0] != 0;
+  solution.unsupported = found[1] != 0;
   cost_.newton_iterations += solution.iterations;
   cost_.dense_factorizations += solution.factorizations;
   return solution.converged;
 }
 
-// Heat that the contact leads or makes is known at the contact points alone: with the temperatures there, theta_c =
-// free - C (flow), the flow is found from a dense linear system, as the contact force is.
+// Velocity (and, monolithic, temperature) of the step. Returns whether contact was solved for.
+template <int d>
+bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contact) {
+  {
+    const Timed part(cost_.momentum_seconds);
+    momentum_right_side(loads);
+    if (monolithic()) {
+      heat_right_side(loads, nullptr, coupled_scale_);
+      join(momentum_right_, heat_right_, coupled_right_);
+    }
+    free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
+  }
+  if (contact_ && (layout_.sum(free_.allFinite() ? 0.0 : 1.0) > 0 ||
+                   !solve_contact(loads, free_, contact_force_, contact)))
+    return false;
+  const Timed part(cost_.momentum_seconds);
+  expand(contact, monolithic() ? coupled_ : next_.w, strained_w_);
+  if (monolithic()) split(coupled_, next_.w, next_.theta);
+  return true;
+}
+
+// Heat that the contact leads or makes is known at the contact points alone: as power that a node loses at its
+// temperature, less what comes from the foundation and from friction.
+template <int d>
+void Stepper<d>::take_flow(const StepLoads& loads) {
+  const auto& shape = surface_.scalar_shape();
+  const ContactFlow flow =
+      contact_flow(problem_, surface_, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)));
+  flow_ = shape.transpose() * flow.conductance.asDiagonal() * shape;
+  given_flow_ = shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation) + flow.friction).eval();
+  for (Eigen::Index i = 0; i < given_flow_.size(); ++i)
+    if (fixed_contact_[static_cast<std::size_t>(i)]) {  // a held temperature takes any flow
+      flow_.row(i).setZero();
+      given_flow_[i] = 0;
+    }
+}
+
 template <int d>
 void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
   const Timed timed(cost_.heat_seconds);
   heat_right_side(loads, heating_w, 1);
+  if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
+  if (reactive()) take_flow(loads);
+  solve_heat(heat_right_, heat_external_, given_flow_, next_.theta);
+}
+
+// The temperatures theta_c of the contact nodes, free - C (flow theta_c - given) + W_c a with the constants a that are
+// solved for apart, are found from a dense linear system, as the contact forces are.
+template <int d>
+void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out) {
+  const Eigen::VectorXd free = heat_->reduce(right);
+  const Eigen::Index m = constants_.count();
+  const Eigen::VectorXd load = m > 0 ? constants_.load(external, right) : Eigen::VectorXd();
   if (!reactive()) {
-    heat_->solve(heat_right_, next_.theta);
+    heat_->expand(Eigen::VectorXd::Zero(free.size()), out);
+    if (m > 0) {
+      WARMSLIP_PETSC(VecCopy(out, right));
+      constants_.add(constants_.alone(load), right, out);
+    }
     return;
   }
-  const auto& shape = surface_.scalar_shape();
-  const Eigen::VectorXd free = heat_->reduce(heat_right_);
-  const ContactFlow flow = contact_flow(problem_, surface_, surface_.at_points(surface_.nodal_values(next_.u)),
-                                        surface_.at_points(surface_.nodal_values(next_.w)), loads.gap);
-  // power a node loses: what is led at its temperature less what comes from the foundation and from friction
-  Eigen::MatrixXd led = shape.transpose() * flow.conductance.asDiagonal() * shape;
-  Eigen::VectorXd given = shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation) + flow.friction).eval();
-  for (Eigen::Index i = 0; i < given.size(); ++i)
-    if (fixed_contact_[static_cast<std::size_t>(i)]) {  // a held temperature takes any flow
-      led.row(i).setZero();
-      given[i] = 0;
-    }
+  const Eigen::Index n = free.size();
   const Eigen::MatrixXd& compliance = heat_->compliance();
-  const Eigen::MatrixXd tangent = Eigen::MatrixXd::Identity(free.size(), free.size()) + compliance * led;
-  const Eigen::VectorXd theta = tangent.partialPivLu().solve(free + compliance * given);
-  heat_->expand(led * theta - given, next_.theta);
+  Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n + m, n + m);
+  Eigen::VectorXd loads(n + m);
+  system.topLeftCorner(n, n) += compliance * flow_;
+  loads.head(n) = free + compliance * given;
+  if (m > 0) {
+    Eigen::MatrixXd along(n, m);
+    for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(constants_.along(j));
+    system.topRightCorner(n, m) = -along;
+    system.bottomLeftCorner(m, n) = along.transpose() * flow_;
+    system.bottomRightCorner(m, m) = constants_.inertia();
+    loads.tail(m) = load + along.transpose() * given;
+  }
+  const Eigen::VectorXd found = system.partialPivLu().solve(loads);
+  heat_->expand(flow_ * found.head(n) - given, out);
+  if (m > 0) {
+    WARMSLIP_PETSC(VecCopy(out, right));
+    constants_.add(found.tail(m), right, out);
+  }
 }
 
 template <int d>

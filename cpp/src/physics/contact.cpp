@@ -11,7 +11,7 @@ double NormalCompliance::pressure(double r) const {
 double NormalCompliance::tangent(double r) const {
   if (r <= 0) return 0;
   if (custom) return custom(r)[1];
-  if (exponent == 1) return stiffness * r < most ? stiffness : 0;
+  if (exponent == 1) return rigid() || stiffness * r < most ? stiffness : 0;
   const double slope = stiffness * exponent * std::pow(r, exponent - 1);
   return slope * r / exponent < most ? slope : 0;
 }
@@ -19,6 +19,7 @@ double NormalCompliance::tangent(double r) const {
 double NormalCompliance::energy(double r) const {
   if (r <= 0) return 0;
   if (custom) return custom(r)[2];
+  if (rigid()) return 0;  // it stores nothing
   if (linear()) return 0.5 * stiffness * r * r;
   const double full =
       stiffness > 0 ? std::pow(most / stiffness, 1 / exponent) : r;  // penetration of the largest pressure
@@ -38,44 +39,89 @@ FrictionBound Friction::bound(double pressure, double slip_speed) const {
   return {value, mu, speed > 0 ? -fall / speed * pressure : 0};
 }
 
+double NormalCompliance::penetration(double pressure, double r) const {
+  if (custom || pressure <= 0 || pressure >= most || stiffness == 0) return r;
+  return exponent == 1 ? pressure / stiffness : std::pow(pressure / stiffness, 1 / exponent);
+}
+
+double NormalCompliance::remaining(double y, double give) const {
+  if (linear()) return y / (1 + give * stiffness);
+  if (most < unlimited && y - give * most >= penetration(std::nextafter(most, 0), y)) return y - give * most;
+  // convex and rising: from the right, Newton's method falls to the root
+  double s = stiffness > 0 && give > 0 ? std::min(y, std::pow(y / (give * stiffness), 1 / exponent)) : y;
+  for (int i = 0; i < 60; ++i) {
+    const double p = stiffness * std::pow(s, exponent), slope = 1 + give * exponent * (s > 0 ? p / s : 0);
+    const double next = s - (s + give * p - y) / slope;
+    if (!(next < s) || next <= 0) break;
+    s = next;
+  }
+  return s;
+}
+
+NormalResidual normal_residual(const NormalCompliance& law, double weight, double give, double force, double r) {
+  if (law.custom) {  // known at penetrations that occur, and not between them
+    const double slope = weight * law.tangent(r), scale = 1 / (1 + give * slope);
+    return {force - weight * law.pressure(r), 1, -slope, std::isfinite(scale) && r > 0};
+  }
+  const double y = r + give * force;
+  if (!(y > 0)) return {force, 1, 0, false};
+  if (law.linear()) {
+    const double stiff = weight * law.stiffness * give;  // of the foundation over the body
+    if (stiff < 1) return {(force - weight * law.stiffness * r) / (1 + stiff), 1 / (1 + stiff),
+                           -weight * law.stiffness / (1 + stiff), true};
+    const double soft = 1 / stiff;
+    return {(soft * force - r / give) / (1 + soft), soft / (1 + soft), -1 / (give * (1 + soft)), true};
+  }
+  const double s = law.remaining(y, weight * give), slope = weight * law.tangent(s), stiff = slope * give;
+  const double value = stiff < 1 ? force - weight * law.pressure(s) : (s - r) / give;
+  return {value, 1 / (1 + stiff), -slope / (1 + stiff), true};
+}
+
 template <int d>
-PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, double alpha, double beta,
+PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
                           const Point<d>& force, const Point<d>& velocity) {
   const Point<d>& nu = point.normal;
   const Tensor2<d> normal = nu * nu.transpose();
   const Tensor2<d> tangential = Tensor2<d>::Identity() - normal;
-  const double r = point.penetration + k * velocity.dot(nu);
-  const double pressure_tangent = law.compliance.tangent(r);
+  const double r = point.penetration + k * velocity.dot(nu), lambda = force.dot(nu), beta = 1 / own.tangential;
+  const NormalResidual across = normal_residual(law.compliance, point.weight, own.normal, lambda, r);
   const Point<d> slip = tangential * velocity;
-  const FrictionBound friction = law.bound(r, slip.norm());
+  const double speed = slip.norm();
+  const FrictionBound friction = law.friction.bound(std::max(lambda, 0.0) / point.weight, speed);
   const double bound = point.weight * friction.value;
-  // derivative of the bound by the velocity
-  Point<d> widening = point.weight * friction.by_pressure * pressure_tangent * k * nu;
-  if (friction.by_speed != 0 && slip.norm() > 0) widening += point.weight * friction.by_speed * slip.normalized();
+  // derivatives of the bound by the force and by the velocity
+  const Point<d> widening = (lambda > 0 ? friction.by_pressure : 0.0) * nu;
+  const Point<d> weakening = friction.by_speed != 0 && speed > 0
+                                 ? Point<d>(point.weight * friction.by_speed / speed * slip)
+                                 : Point<d>(Point<d>::Zero());
 
   PointResidual<d> out;
-  out.touching = r > 0;
-  out.value = alpha * (force.dot(nu) - point.weight * law.compliance.pressure(r)) * nu;
-  out.by_force = alpha * normal;
-  out.by_velocity = -alpha * point.weight * pressure_tangent * k * normal;
+  out.touching = across.touching;
+  out.pressed = lambda > 0;
+  out.apart = false;
+  out.value = across.value * nu;
+  out.by_force = across.by_force * normal;
+  out.by_velocity = k * across.by_penetration * normal;
   out.slip_sign = 0;
 
   const Point<d> trial = tangential * (force + beta * velocity);
   const double size = trial.norm();
-  if (bound <= 0) {  // no pressure or no friction: the tangential force vanishes
-    out.status = r <= 0 ? Status::open : Status::slip;
+  if (bound <= 0 || (!out.touching && law.friction.cohesion <= 0 && !law.friction.custom)) {  // no friction
+    out.status = out.touching ? Status::slip : Status::open;
+    out.apart = !out.touching && across.by_force == 1 && across.by_penetration == 0;
     out.value += tangential * force;
     out.by_force += tangential;
   } else if (law.friction.regularisation > 0) {
-    const double eps = law.friction.regularisation, blunt = std::hypot(slip.norm(), eps);
-    out.status = slip.norm() < eps ? Status::stick : Status::slip;
-    out.value += tangential * force - bound / blunt * slip;
-    out.by_force += tangential;
+    const double blunt = std::hypot(speed, law.friction.regularisation);
+    const Point<d> direction = slip / blunt;
+    out.status = speed < law.friction.regularisation ? Status::stick : Status::slip;
+    out.value += tangential * force - bound * direction;
+    out.by_force += tangential - direction * widening.transpose();
     out.by_velocity -=
-        bound / blunt * (tangential - slip * slip.transpose() / (blunt * blunt)) + slip / blunt * widening.transpose();
+        bound / blunt * (tangential - direction * direction.transpose()) + direction * weakening.transpose();
   } else if (size <= bound) {
     out.status = Status::stick;
-    out.value -= beta * (tangential * velocity);
+    out.value -= beta * slip;
     out.by_velocity -= beta * tangential;
   } else {
     out.status = Status::slip;
@@ -86,8 +132,8 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
     const Tensor2<d> turn = d == 2 ? Tensor2<d>(Tensor2<d>::Zero())
                                    : Tensor2<d>(bound / size * (tangential - direction * direction.transpose()));
     out.value += tangential * force - bound * direction;
-    out.by_force += tangential - turn;
-    out.by_velocity -= beta * turn + direction * widening.transpose();
+    out.by_force += tangential - turn - direction * widening.transpose();
+    out.by_velocity -= beta * turn + direction * weakening.transpose();
   }
   return out;
 }
@@ -109,8 +155,8 @@ double friction_power(const Friction& friction, double bound, double slip_speed)
 }
 
 #define WARMSLIP_INSTANTIATE(d)                                                                            \
-  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, double, double, \
-                                        const Point<d>&, const Point<d>&);                                 \
+  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double,                 \
+                                        const OwnCompliance&, const Point<d>&, const Point<d>&);           \
   template FrictionDefect friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

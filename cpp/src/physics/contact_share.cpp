@@ -31,7 +31,8 @@ std::vector<Resting<d>> at_rest(const ContactProblem<d>& problem, const ContactS
     const Point<d> w = solution.velocity.template segment<d>(row);
     const Tensor2<d> tangential = Tensor2<d>::Identity() - point.normal * point.normal.transpose();
     const double speed = (tangential * w).norm();
-    const double bound = point.weight * law.bound(point.penetration + problem.step * w.dot(point.normal), speed).value;
+    const double pressure = std::max(solution.force.template segment<d>(row).dot(point.normal), 0.0) / point.weight;
+    const double bound = point.weight * law.friction.bound(pressure, speed).value;
     // the power that will be missing is at most twice bound times speed
     if (law.friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest)
       out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, tangential});

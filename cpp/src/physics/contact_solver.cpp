@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 #include <stdexcept>
 
 namespace warmslip {
@@ -17,97 +16,146 @@ bool by_status(const ContactProblem<d>& problem) {
 
 }  // namespace
 
+namespace {
+
+// How far the penetration r is from those that bear `pressure`; infinite where none does, or none is known to.
+double distance(const NormalCompliance& law, double pressure, double r) {
+  if (pressure < 0) return unlimited;
+  if (pressure == 0) return std::max(r, 0.0);
+  if (law.rigid()) return std::abs(r);
+  if (law.custom) {
+    const double slope = law.tangent(r);
+    return slope > 0 ? std::abs(pressure - law.pressure(r)) / slope : unlimited;
+  }
+  if (pressure > law.most || law.stiffness == 0) return unlimited;
+  return std::abs(r - law.penetration(pressure, r));
+}
+
+}  // namespace
+
 template <int d>
-double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
-                    double* floor) {
-  constexpr double eps = std::numeric_limits<double>::epsilon();
-  double largest = 0, fastest = 0, rounding = 0, widest = 0;
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
+  double largest = 0, reach = 0, fastest = 0, widest = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
-    const ContactLaw& law = problem.law(i);
     const auto at = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
                    free = problem.free.template segment<d>(at);
-    const double r = point.penetration + problem.step * w.dot(point.normal);
-    const double speed = (w - w.dot(point.normal) * point.normal).norm();
-    largest = std::max({largest, f.norm(), point.weight * law.compliance.pressure(r),
-                        point.weight * law.friction.bound(0, speed).value});  // the last: borne without pressure
-    widest = std::max(widest, point.weight * law.bound(r, speed).value);
-    fastest = std::max({fastest, free.norm(), w.norm()});
-    // the velocity is what the contact force leaves of the free one
+    const double speed = (w - w.dot(point.normal) * point.normal).norm(), lambda = f.dot(point.normal);
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
-    const double terms = along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free));
-    const double blur =
-        4 * eps * terms;  // what rounding makes of r; a point that is open all the same has no part in it
-    if (r > -blur) rounding = std::max(rounding, point.weight * law.compliance.tangent(std::max(r, 0.0) + blur) * blur);
+    // the velocity is what the contact force leaves of the free one
+    reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
+    fastest = std::max({fastest, free.norm(), w.norm()});
+    largest = std::max(largest, f.norm());
+    widest = std::max(
+        widest, point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
   }
-  *floor = std::numeric_limits<double>::infinity();
-  if (!force.allFinite() || !std::isfinite(largest) || !std::isfinite(fastest))
+  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(fastest))
     return std::numeric_limits<double>::infinity();
-  if (largest <= rounding) {  // no contact force that rounding would let one tell from none: is that small?
-    *floor = problem.scale > 0 ? rounding / problem.scale : 0;  // a body at rest has nothing to be compared with
-    return 0;
-  }
-  *floor = rounding / largest;
-  const double bound_scale = widest > 0 ? widest : largest;
+  largest = std::max(largest, widest);
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
     const ContactLaw& law = problem.law(i);
     const auto at = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
-    const double r = point.penetration + problem.step * w.dot(point.normal);
-    const Point<d> f_tau = f - f.dot(point.normal) * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
-    const double bound = point.weight * law.bound(r, w_tau.norm()).value;
+    const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
+    const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
+    const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
     const FrictionDefect defect = friction_defect<d>(law.friction, bound, f_tau, w_tau);
-    worst = std::max({worst, std::abs(f.dot(point.normal) - point.weight * law.compliance.pressure(r)) / largest,
-                      defect.force / bound_scale, fastest > 0 ? defect.power / (bound_scale * fastest) : 0.0});
+    const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
+                 away = distance(law.compliance, lambda / point.weight, r);
+    const double normal = off == 0 || away == 0 ? 0 : std::min(off / largest, away / reach);
+    const double friction = widest > 0 ? defect.force / widest : defect.force > 0 ? defect.force / largest : 0;
+    const double power = widest > 0 && fastest > 0 ? defect.power / widest / fastest : 0;
+    if (!(normal < std::numeric_limits<double>::infinity())) return std::numeric_limits<double>::infinity();
+    worst = std::max({worst, normal, friction, power});
   }
   return worst;
 }
 
 template <int d>
 struct ContactSolver<d>::Linearisation {
-  Eigen::VectorXd velocity, value;
+  Eigen::VectorXd velocity, value;  // value: of all points, then of the rigid motions
   std::vector<PointResidual<d>> points;
   std::vector<int> key;  // what the tangent depends on
 };
 
 template <int d>
-ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions options)
-    : compliance_(std::move(compliance)), options_(options) {
+ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions options, RigidCoupling rigid)
+    : compliance_(std::move(compliance)), options_(options), rigid_(std::move(rigid)) {
   if (compliance_.rows() != compliance_.cols() || compliance_.rows() % d != 0)
     throw std::invalid_argument("the compliance must be square with d rows a contact point");
-  reach_ = compliance_.cwiseAbs().rowwise().sum();
-  spectral_ = compliance_.size() ? reach_.maxCoeff() : 0;
+  if (rigid_.motions.size() == 0) rigid_.motions.resize(compliance_.rows(), rigid_.count());
+  spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
+  give_ = spectral_ > 0 ? spectral_ : 1;
+}
+
+// The compliance of a point by itself; zero where its motion is given.
+template <int d>
+OwnCompliance ContactSolver<d>::own(const ContactProblem<d>& problem, std::size_t i) const {
+  const Point<d>& nu = problem.points[i].normal;
+  const auto row = static_cast<Eigen::Index>(i) * d;
+  const Tensor2<d> block = compliance_.template block<d, d>(row, row);
+  const Tensor2<d> tangential = Tensor2<d>::Identity() - nu * nu.transpose();
+  const Tensor2<d> across = tangential * block * tangential;
+  // of the at most two eigenvalues that are not zero the larger one
+  const double half = across.trace() / 2,
+               largest = d == 2 ? across.trace()
+                                : half + std::sqrt(std::max(0.0, across.squaredNorm() / 2 - half * half));
+  return {problem.step * nu.dot(block * nu), largest / boldness_};
+}
+
+// A point whose motion is given: its force follows from the law, and moves nothing.
+template <int d>
+void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t i) const {
+  const ContactPoint<d>& point = problem.points[i];
+  const ContactLaw& law = problem.law(i);
+  const auto row = static_cast<Eigen::Index>(i) * d;
+  const Point<d> w = at.velocity.template segment<d>(row), slip = w - w.dot(point.normal) * point.normal;
+  const double r = point.penetration + problem.step * w.dot(point.normal), speed = slip.norm();
+  const double pressure = law.compliance.rigid() ? 0 : law.compliance.pressure(r);
+  const double bound = point.weight * law.friction.bound(pressure, speed).value;
+  const double smeared = std::hypot(speed, law.friction.regularisation);
+  Point<d> force = point.weight * pressure * point.normal;
+  if (smeared > 0) force += bound / smeared * slip;
+  PointResidual<d>& out = at.points[i];
+  out.slip_sign = 0;
+  out.touching = r > 0;
+  out.pressed = pressure > 0;
+  out.value = at.value.template segment<d>(row) - force;
+  out.by_force = Tensor2<d>::Identity();
+  out.by_velocity.setZero();
+  out.status = bound <= 0 && r <= 0 ? Status::open : speed > 0 ? Status::slip : Status::stick;
+  out.apart = true;
+  at.value.template segment<d>(row) = out.value;
 }
 
 template <int d>
 typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
-                                                                     const Eigen::VectorXd& force) const {
+                                                                     const Eigen::VectorXd& force,
+                                                                     const Eigen::VectorXd& rigid) const {
   Linearisation at;
   at.velocity = problem.free;
   at.velocity.noalias() -= compliance_ * force;
-  at.value.resize(force.size());
+  at.value.resize(force.size() + rigid_.count());
+  at.value.head(force.size()) = force;
+  if (rigid_.count() > 0) {
+    at.velocity.noalias() += give_ * rigid_.motions * rigid;
+    at.value.tail(rigid_.count()) = rigid_.motions.transpose() * force + give_ * rigid_.inertia * rigid - problem.rigid;
+  }
+  at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
-    const ContactPoint<d>& point = problem.points[i];
-    const ContactLaw& law = problem.law(i);
     const auto row = static_cast<Eigen::Index>(i) * d;
-    const Tensor2<d> own = compliance_.template block<d, d>(row, row);
-    const Point<d>& nu = point.normal;
-    const double normal = nu.dot(own * nu);
-    // rows in units of force, of order one in the force whatever the stiffness
-    const double stiffness =
-        law.compliance.scale(point.penetration + problem.step * problem.free.template segment<d>(row).dot(nu));
-    // a law of the user's may be beyond doubles where no contact stops the body; any scale will do
-    const double alpha = std::isfinite(stiffness) ? 1 / (1 + point.weight * stiffness * problem.step * normal) : 1;
-    // force per velocity when the neighbours move along; the point's own compliance alone makes Newton cycle far more
-    // often
-    const double beta = 1 / std::max(reach_.template segment<d>(row).maxCoeff(), 1e-300);
-    at.points.push_back(residual<d>(law, point, problem.step, alpha, beta, force.template segment<d>(row),
-                                    at.velocity.template segment<d>(row)));
-    at.value.template segment<d>(row) = at.points.back().value;
-    at.key.push_back(at.points.back().key());
+    const OwnCompliance scales = own(problem, i);
+    if (scales.normal > 0 && scales.tangential > 0) {
+      at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step, scales,
+                                 force.template segment<d>(row), at.velocity.template segment<d>(row));
+      at.value.template segment<d>(row) = at.points[i].value;
+    } else {
+      prescribed(problem, at, i);
+    }
+    at.key.push_back(at.points[i].key());
   }
   return at;
 }
@@ -117,13 +165,20 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
   closed_.clear();
   for (std::size_t i = 0; i < at.points.size(); ++i)
-    if (at.points[i].status != Status::open)
+    if (!at.points[i].apart)
       for (int c = 0; c < d; ++c) closed_.push_back(static_cast<Eigen::Index>(i) * d + c);
-  Eigen::MatrixXd tangent = compliance_(closed_, closed_);
-  for (std::size_t j = 0; j < closed_.size(); j += d) {
-    const auto row = static_cast<Eigen::Index>(j);
-    const auto i = static_cast<std::size_t>(closed_[j] / d);
-    tangent.template middleRows<d>(row) = (-at.points[i].by_velocity * tangent.template middleRows<d>(row)).eval();
+  const auto n = static_cast<Eigen::Index>(closed_.size()), m = rigid_.count();
+  Eigen::MatrixXd tangent(n + m, n + m);
+  tangent.topLeftCorner(n, n) = -compliance_(closed_, closed_);
+  if (m > 0) {
+    const Eigen::MatrixXd motions = rigid_.motions(closed_, Eigen::all);
+    tangent.topRightCorner(n, m) = give_ * motions;
+    tangent.bottomLeftCorner(m, n) = motions.transpose();
+    tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
+  }
+  for (Eigen::Index row = 0; row < n; row += d) {
+    const auto i = static_cast<std::size_t>(closed_[static_cast<std::size_t>(row)] / d);
+    tangent.template middleRows<d>(row) = (at.points[i].by_velocity * tangent.template middleRows<d>(row)).eval();
     tangent.template block<d, d>(row, row) += at.points[i].by_force;
     // Gauss points outnumber nodes: sticking ones share their force arbitrarily, and this picks the nearest share.
     // The residual is untouched, so the answer is not regularised.
@@ -132,56 +187,71 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
       tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - nu * nu.transpose());
     }
   }
-  tangent_.compute(tangent);
+  if (n + m > 0) tangent_.compute(tangent);
+  // without mass the points in contact alone hold the body
+  solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && !(tangent_.rcond() > 1e-14);
   factored_ = at.key;
   ++solution.factorizations;
 }
 
-// The Newton direction: an open point drops its force at once, the closed ones share a dense system.
+// The Newton direction of forces and rigid motions: points apart take their force at once, the others share a dense
+// system.
 template <int d>
-Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at, const Eigen::VectorXd& force) const {
-  Eigen::VectorXd out = -force;
+Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
+  const auto n = static_cast<Eigen::Index>(closed_.size()), m = rigid_.count(), all = compliance_.rows();
+  Eigen::VectorXd out = -at.value;
   out(closed_).setZero();
-  Eigen::VectorXd right = -at.value(closed_);
+  out.tail(m).setZero();
+  Eigen::VectorXd right(n + m);
+  right << -at.value(closed_), -at.value.tail(m);
   if (!out.isZero(0)) {
-    const Eigen::VectorXd change = compliance_ * out;  // of minus the velocities
-    for (std::size_t j = 0; j < closed_.size(); j += d)
-      right.template segment<d>(static_cast<Eigen::Index>(j)) +=
-          at.points[static_cast<std::size_t>(closed_[j] / d)].by_velocity * change.template segment<d>(closed_[j]);
+    const Eigen::VectorXd change = compliance_ * out.head(all);  // of minus the velocities
+    for (Eigen::Index row = 0; row < n; row += d) {
+      const Eigen::Index component = closed_[static_cast<std::size_t>(row)];
+      right.template segment<d>(row) +=
+          at.points[static_cast<std::size_t>(component / d)].by_velocity * change.template segment<d>(component);
+    }
+    if (m > 0) right.tail(m) -= rigid_.motions.transpose() * out.head(all);
   }
-  if (!closed_.empty()) {
+  if (n + m > 0) {
     right = tangent_.solve(right);
-    out(closed_) = right;
+    out(closed_) = right.head(n);
+    out.tail(m) = right.tail(m);
   }
   return out;
 }
 
 template <int d>
 bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const {
-  solution.law_residual = law_residual(problem, solution.force, solution.velocity, &solution.floor);
-  return solution.law_residual <= options_.tolerance + solution.floor;
+  solution.law_residual = law_residual(problem, solution.force, solution.velocity);
+  return solution.law_residual <= options_.tolerance;
 }
 
 template <int d>
-bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
-  Linearisation at = linearise(problem, solution.force);
-  std::set<std::vector<int>> seen;
+bool ContactSolver<d>::newton(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  Linearisation at = linearise(problem, solution.force, solution.rigid);
+  const Eigen::Index all = compliance_.rows();
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
-    if (accept(problem, solution)) break;
+    // the motions that are solved for apart are linear and exact after a full step
+    const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
+    const double forces = rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
+    if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) break;
     if (step == options_.newton_steps) return false;
-    // the same statuses once more, after others: an undamped iteration would cycle for ever
-    if (by_status(problem) && !line_search && at.key != factored_ && !seen.insert(at.key).second) return false;
     factor(problem, at, solution);
-    const Eigen::VectorXd change = direction(at, solution.force);
-    if (!change.allFinite()) return false;
+    const Eigen::VectorXd change = direction(at);
+    if (!change.allFinite() || solution.unsupported) {
+      factored_.clear();
+      return false;
+    }
     ++solution.iterations;
     const double before = at.value.norm();
-    double length = 1;
-    for (;; length /= 2) {
-      Linearisation next = linearise(problem, solution.force + length * change);
-      if (!line_search || next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
-        solution.force += length * change;
+    for (double length = 1;; length /= 2) {
+      Linearisation next = linearise(problem, solution.force + length * change.head(all),
+                                     solution.rigid + length * change.tail(rigid_.count()));
+      if (next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
+        solution.force += length * change.head(all);
+        solution.rigid += length * change.tail(rigid_.count());
         at = std::move(next);
         break;
       }
@@ -196,11 +266,13 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
 // and whoever asks which points are at rest would find it slipping.
 template <int d>
 void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
-  const Linearisation at = linearise(problem, solution.force);
+  const Linearisation at = linearise(problem, solution.force, solution.rigid);
   factor(problem, at, solution);
   ContactSolution<d> finer = solution;
-  finer.force += direction(at, solution.force);
-  const Linearisation there = linearise(problem, finer.force);
+  const Eigen::VectorXd change = direction(at);
+  finer.force += change.head(compliance_.rows());
+  finer.rigid += change.tail(rigid_.count());
+  const Linearisation there = linearise(problem, finer.force, finer.rigid);
   finer.velocity = there.velocity;
   if (!accept(problem, finer) || finer.law_residual > solution.law_residual) return;
   for (std::size_t i = 0; i < there.points.size(); ++i) finer.status[i] = there.points[i].status;
@@ -212,13 +284,14 @@ void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<
 // gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
 template <int d>
 bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  if (rigid_.count() > 0) return false;
   for (const ContactLaw& law : problem.laws)  // smooth: no threshold to freeze
     if (law.friction.regularisation > 0) return false;
   const double rate = 1 / spectral_, k = problem.step;
   // lambda = weight p_nu(r) with r = penetration + k (z - lambda) / rate: falls on the right, rises on the left
   const auto normal_force = [&](const ContactPoint<d>& point, const NormalCompliance& law, double z) {
     if (law.linear()) {
-      const double spring = point.weight * law.stiffness * k;
+      const double spring = point.weight * law.stiffness * k;  // force per velocity
       return spring > 0 ? std::max(0.0, (z + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
     }
     // no more than what holds the point at r = 0; a law of the user's may know no pressure beyond
@@ -270,9 +343,7 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     inertia = stronger;
     if (step % 200 == 199) {
       solution.force = force;
-      if (newton(problem, false, solution)) return true;
-      solution.force = force;  // a law that bends, or ends, has to be approached step by step
-      if (!by_status(problem) && newton(problem, true, solution)) return true;
+      if (newton(problem, solution)) return true;
     }
   }
   return false;
@@ -283,7 +354,8 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
   const auto count = problem.points.size();
   if (!by_status(problem) || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
   for (const ContactLaw& law : problem.laws)  // a bound that is there without pressure has more statuses
-    if (law.friction.cohesion > 0) return false;
+    if (law.friction.cohesion > 0 || law.compliance.rigid()) return false;
+  if (rigid_.count() > 0) return false;
   const double k = problem.step;
   for (std::size_t code = 0, codes = std::size_t{1} << (2 * count); code < codes; ++code) {
     Eigen::MatrixXd by_force = Eigen::MatrixXd::Zero(compliance_.rows(), compliance_.cols()), by_velocity = by_force;
@@ -310,7 +382,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
     const Eigen::FullPivLU<Eigen::MatrixXd> lu(by_force - by_velocity * compliance_);
     solution.force = lu.solve(right - by_velocity * problem.free);
     if (!solution.force.allFinite()) continue;
-    const Linearisation at = linearise(problem, solution.force);
+    const Linearisation at = linearise(problem, solution.force, solution.rigid);
     solution.velocity = at.velocity;
     if (!accept(problem, solution)) continue;
     solution.status.clear();
@@ -325,23 +397,51 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   ContactSolution<d> solution;
   solution.force = force;
   solution.velocity = problem.free;
+  solution.rigid = Eigen::VectorXd::Zero(rigid_.count());
   if (!problem.free.allFinite()) return solution;
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
     solution.stage = stage;
     solution.converged = method();
-    if (!solution.converged && stage != Stage::line_search) solution.force = force;
+    if (!solution.converged) solution.force = force;
   };
-  attempt(Stage::newton, [&] { return newton(problem, false, solution); });
-  attempt(Stage::line_search, [&] { return newton(problem, true, solution); });
+  attempt(Stage::newton, [&] { return newton(problem, solution); });
+  if (rigid_.count() > 0)  // a body that only contact holds: again with all points pressed
+    attempt(Stage::restart, [&] {
+      solution.rigid.setZero();
+      const double share = problem.rigid.cwiseAbs().maxCoeff() / static_cast<double>(problem.points.size());
+      for (std::size_t i = 0; i < problem.points.size(); ++i) {
+        const ContactPoint<d>& point = problem.points[i];
+        const auto row = static_cast<Eigen::Index>(i) * d;
+        const double give = own(problem, i).normal,
+                     r = point.penetration + problem.step * problem.free.template segment<d>(row).dot(point.normal);
+        solution.force.template segment<d>(row) =
+            (share + (give > 0 ? 2 * std::max(-r, 0.0) / give : 0.0)) * point.normal;
+      }
+      return newton(problem, solution);
+    });
+  // again from no force, with other scales of the tangential rows
+  for (const double boldness : {1.0, 0.1, 10.0, 0.01})
+    attempt(Stage::restart, [&] {
+      boldness_ = boldness;
+      factored_.clear();
+      solution.force.setZero();
+      solution.rigid.setZero();
+      const bool found = newton(problem, solution);
+      if (boldness_ != 1) factored_.clear();
+      boldness_ = 1;
+      return found;
+    });
   attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
+  solution.unsupported = solution.unsupported && !solution.converged;
+  solution.rigid *= give_;
   return solution;
 }
 
-template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&, double*);
-template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&, double*);
+template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
+template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
 template class ContactSolver<2>;
 template class ContactSolver<3>;
 

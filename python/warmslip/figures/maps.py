@@ -23,7 +23,6 @@ OUTCOMES = {
     "identity_violated": VERMILLION,
 }
 CLAIMS = {"yes": SKY, "no": ORANGE}
-BOUND = 1e-9  # beyond it a step is right only within the rounding floor of the friction law
 IDENTITIES = ("energy", "heat", "force", "law")
 
 
@@ -153,10 +152,6 @@ def extremes(inputs: list[Path]) -> tuple[Figure, str]:
         if top
         else ""
     )
-    starred = sum(worst_text(line).endswith("*") for line in lines)
-    said += (
-        f" {starred} (starred) exceed {number(BOUND)} within the rounding floor of the friction law." if starred else ""
-    )
     wrong = sum(line["verdict"] == "WRONG" for line in lines)
     said += (
         f" {wrong or 'None'} of the runs {'are' if wrong > 1 else 'is'} silently wrong{' (framed)' if wrong else ''}."
@@ -183,8 +178,8 @@ def worst(line: dict[str, str]) -> float:
 
 
 def worst_text(line: dict[str, str]) -> str:
-    """The worst identity, starred where only the rounding floor of the friction law excuses it."""
+    """The worst identity."""
     value = worst(line)
     if not np.isfinite(value):
         return ""
-    return f"{value:.0e}".replace("e-0", "e-") + ("*" if value > BOUND and line["outcome"] == "right" else "")
+    return f"{value:.0e}".replace("e-0", "e-")

@@ -192,14 +192,13 @@ def lines(name: str, scene: FullScene) -> list[Line]:
     for _ in job.steps():
         pass
     state(job)
-    stated = {"energy": job.floors["energy_floor"], "law": job.floors["law_floor"]}  # what rounding of the law explains
     out = [
         below(
             name,
             f"the {identity} balance closes at every step",
             "identity",
             worst,
-            ROUND_OFF + stated.get(identity, 0.0),
+            ROUND_OFF,
         )
         for identity, worst in job.worst.items()
     ]

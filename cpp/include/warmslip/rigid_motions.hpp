@@ -1,0 +1,66 @@
+// Motions that the inner forces of a body do not resist, solved for apart from its deformation.
+//
+// Elasticity and viscosity vanish on rigid motions of a body without supports, and conduction on a constant
+// temperature of an insulated one. In K = M' + (inner part), only the mass M' holds these motions. In long steps M' is
+// so small beside the inner part that rounding of the latter swamps it. Exactly one thing is known about them: the
+// inner part drops out of their equations. So with Z the motions, b = b_ext + b_in the right-hand side and b_in its
+// inner part (Z^T b_in = 0),
+//
+//     K x = b - E lambda   <=>   x = K~^-1 (b - E lambda) + W a,   H a + W_c^T lambda = Z^T b_ext - V^T b
+//
+// where K~ = K + P has as many springs P as there are motions and is as well conditioned as a supported body,
+// V = K~^-1 M' Z, W = Z - V = K~^-1 P Z, H = Z^T M' W and W_c = E^T W. No term of the equations for a is a difference
+// of large numbers. This is the deflation of floating subdomains of FETI (Farhat & Roux, Int. J. Numer. Meth. Engng 32,
+// 1991), with the mass kept.
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "warmslip/contact_surface.hpp"
+#include "warmslip/factor.hpp"
+#include "warmslip/layout.hpp"
+
+namespace warmslip {
+
+class RigidMotions {
+ public:
+  using Apply = std::function<void(Vec, Vec)>;
+
+  RigidMotions() = default;
+  /// Rigid motions (block d) or constants (block 1) of the parts of the mesh that hang together and have no node in the
+  /// `fixed` parts; displacement by x - centre over the size of the part, dimensionless. `avoid`: nodes that get no
+  /// spring where others will do.
+  template <int d>
+  RigidMotions(const Layout<d>& layout, int block, const std::vector<std::string>& fixed,
+               const std::vector<std::string>& avoid);
+
+  bool empty() const { return motions_.empty(); }
+  Eigen::Index count() const { return static_cast<Eigen::Index>(motions_.size()); }
+  /// K -> K~.
+  void add_springs(Mat k);
+  /// V, W and H for a factored K~ and the mass M'.
+  void prepare(Factor& factor, const Apply& mass);
+
+  /// Z^T b_ext - V^T b (collective).
+  Eigen::VectorXd load(Vec external, Vec all) const;
+  /// The motions a without contact. Throws SolveFailed when there is no mass to hold them.
+  Eigen::VectorXd alone(const Eigen::VectorXd& load) const;
+  /// inner -= V a, then x = inner + Z a: with inner = K~^-1 (b - E lambda) the solution, and the part of it that strains.
+  void add(const Eigen::VectorXd& motions, Vec inner, Vec x) const;
+  /// x -= the motion that is nearest to it, in the sum of squares over the nodes.
+  void remove(Vec x) const;
+
+  const Eigen::MatrixXd& inertia() const { return inertia_; }  ///< H
+  Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }  ///< a column of W
+
+ private:
+  Eigen::VectorXd dots(const std::vector<VecHandle>& with, Vec x) const;
+  void combine(const std::vector<VecHandle>& of, const Eigen::VectorXd& by, Vec x) const;
+
+  std::vector<VecHandle> motions_, inner_, along_;  // Z, V, W
+  std::vector<PetscInt> springs_;                   // global unknowns, one a motion
+  std::vector<double> stiffness_;
+  Eigen::MatrixXd inertia_, gram_, at_springs_;  // H, Z^T Z, Z at the springs
+};
+
+}  // namespace warmslip

@@ -1,0 +1,193 @@
+#include "warmslip/rigid_motions.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace warmslip {
+namespace {
+
+// The number of the part that a node hangs together with, the same on every rank.
+template <int d>
+std::vector<Index> connected(const Mesh<d>& mesh) {
+  std::vector<Index> root(static_cast<std::size_t>(mesh.nodes.rows()));
+  std::iota(root.begin(), root.end(), Index{0});
+  const auto find = [&](Index i) {
+    while (root[static_cast<std::size_t>(i)] != i)
+      i = root[static_cast<std::size_t>(i)] = root[static_cast<std::size_t>(root[static_cast<std::size_t>(i)])];
+    return i;
+  };
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    for (int i = 1; i <= d; ++i) {
+      const Index a = find(mesh.cells(c, 0)), b = find(mesh.cells(c, i));
+      root[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    }
+  for (Index i = 0; i < static_cast<Index>(root.size()); ++i) root[static_cast<std::size_t>(i)] = find(i);
+  return root;
+}
+
+// Rigid motions at the nodes of one part, (block nodes, motions): translations, then rotations about the centre.
+template <int d>
+Eigen::MatrixXd motions_of(const Mesh<d>& mesh, const std::vector<Index>& nodes, int block) {
+  const auto n = static_cast<Eigen::Index>(nodes.size());
+  if (block == 1) return Eigen::MatrixXd::Ones(n, 1);
+  Eigen::Matrix<double, Eigen::Dynamic, d> x(n, d);
+  for (Eigen::Index i = 0; i < n; ++i) x.row(i) = mesh.nodes.row(nodes[static_cast<std::size_t>(i)]);
+  x.rowwise() -= x.colwise().mean().eval();
+  x /= std::max(x.cwiseAbs().maxCoeff(), 1e-300);
+  constexpr int count = d * (d + 1) / 2;
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n * d, count);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (int a = 0; a < d; ++a) out(i * d + a, a) = 1;
+    int column = d;
+    for (int a = 0; a < d; ++a)
+      for (int b = a + 1; b < d; ++b, ++column) {
+        out(i * d + a, column) = -x(i, b);
+        out(i * d + b, column) = x(i, a);
+      }
+  }
+  return out;
+}
+
+}  // namespace
+
+template <int d>
+RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector<std::string>& fixed,
+                           const std::vector<std::string>& avoid) {
+  const Mesh<d>& mesh = layout.mesh();
+  const std::vector<Index> root = connected(mesh);
+  std::vector<bool> held(root.size(), false), avoided(root.size(), false);
+  const auto mark = [&](const std::vector<std::string>& parts, std::vector<bool>& marks, bool whole) {
+    for (const auto& name : parts)
+      for (const Index node : mesh.part(name).nodes.reshaped())
+        marks[static_cast<std::size_t>(whole ? root[static_cast<std::size_t>(node)] : node)] = true;
+  };
+  mark(fixed, held, true);
+  mark(avoid, avoided, false);
+  std::vector<std::vector<Index>> parts(root.size());
+  for (std::size_t i = 0; i < root.size(); ++i)
+    if (!held[static_cast<std::size_t>(root[i])]) parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
+  std::vector<Eigen::VectorXd> rows;  // Z at the springs
+  for (const auto& nodes : parts) {
+    if (nodes.size() < 2) continue;  // a node of no cell
+    const Eigen::MatrixXd z = motions_of<d>(mesh, nodes, block);
+    const Eigen::Index first = count(), several = z.cols();
+    for (Eigen::Index j = 0; j < several; ++j) {
+      Eigen::VectorXd values = Eigen::VectorXd::Zero(mesh.nodes.rows() * block);
+      for (std::size_t i = 0; i < nodes.size(); ++i)
+        values.segment(Eigen::Index{nodes[i]} * block, block) = z.col(j).segment(static_cast<Eigen::Index>(i) * block, block);
+      motions_.push_back(layout.vector(block));
+      layout.distribute(values, motions_.back());
+    }
+    // springs where they hold the motions best: rows of Z by pivoting, on the nodes that are not avoided if they suffice
+    Eigen::MatrixXd candidates = z;
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      if (avoided[static_cast<std::size_t>(nodes[i])])
+        candidates.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(candidates.transpose());
+    if (qr.rank() < several || std::abs(qr.maxPivot()) > 1e3 * std::abs(qr.matrixR()(several - 1, several - 1)))
+      qr.compute(z.transpose());
+    for (Eigen::Index j = 0; j < several; ++j) {
+      const Eigen::Index row = qr.colsPermutation().indices()[j];
+      springs_.push_back(layout.global_of(nodes[static_cast<std::size_t>(row / block)]) * block +
+                         static_cast<PetscInt>(row % block));
+      Eigen::VectorXd here = Eigen::VectorXd::Zero(first + several);
+      here.tail(several) = z.row(row).transpose();
+      rows.push_back(here);
+    }
+  }
+  at_springs_ = Eigen::MatrixXd::Zero(count(), count());
+  for (std::size_t i = 0; i < rows.size(); ++i) at_springs_.row(static_cast<Eigen::Index>(i)).head(rows[i].size()) = rows[i];
+  gram_.resize(count(), count());
+  for (Eigen::Index j = 0; j < count(); ++j) gram_.col(j) = dots(motions_, motions_[static_cast<std::size_t>(j)]);
+}
+
+void RigidMotions::add_springs(Mat k) {
+  VecHandle diagonal;
+  WARMSLIP_PETSC(MatCreateVecs(k, diagonal.out(), nullptr));
+  WARMSLIP_PETSC(MatGetDiagonal(k, diagonal));
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(diagonal, &begin, &end));
+  stiffness_.assign(springs_.size(), 0);
+  {
+    Values values(diagonal);
+    for (std::size_t i = 0; i < springs_.size(); ++i)
+      if (springs_[i] >= begin && springs_[i] < end) stiffness_[i] = (*values)[springs_[i] - begin];
+  }
+  MPI_Allreduce(MPI_IN_PLACE, stiffness_.data(), static_cast<int>(stiffness_.size()), MPI_DOUBLE, MPI_SUM,
+                PetscObjectComm(reinterpret_cast<PetscObject>(k)));
+  for (std::size_t i = 0; i < springs_.size(); ++i)
+    if (springs_[i] >= begin && springs_[i] < end)
+      WARMSLIP_PETSC(MatSetValue(k, springs_[i], springs_[i], stiffness_[i], ADD_VALUES));
+  WARMSLIP_PETSC(MatAssemblyBegin(k, MAT_FINAL_ASSEMBLY));
+  WARMSLIP_PETSC(MatAssemblyEnd(k, MAT_FINAL_ASSEMBLY));
+}
+
+void RigidMotions::prepare(Factor& factor, const Apply& mass) {
+  inertia_.resize(count(), count());
+  const VecHandle right = duplicate(motions_.front());
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(right, &begin, &end));
+  for (Eigen::Index j = 0; j < count(); ++j) {
+    const Vec z = motions_[static_cast<std::size_t>(j)];
+    VecHandle v = duplicate(z), w = duplicate(z);
+    WARMSLIP_PETSC(VecSet(right, 0));
+    mass(z, right);
+    factor.solve(right, v);
+    WARMSLIP_PETSC(VecWAXPY(w, -1, v, z));
+    PetscReal size;
+    WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &size));
+    if (size > 0.5) {  // a mass that holds the motion well: Z - V would cancel
+      WARMSLIP_PETSC(VecSet(right, 0));
+      {
+        Values values(right);
+        for (std::size_t i = 0; i < springs_.size(); ++i)
+          if (springs_[i] >= begin && springs_[i] < end)
+            (*values)[springs_[i] - begin] += stiffness_[i] * at_springs_(static_cast<Eigen::Index>(i), j);
+      }
+      factor.solve(right, w);
+    }
+    inner_.push_back(std::move(v));
+    along_.push_back(std::move(w));
+  }
+  for (Eigen::Index j = 0; j < count(); ++j) {
+    WARMSLIP_PETSC(VecSet(right, 0));
+    mass(motions_[static_cast<std::size_t>(j)], right);
+    inertia_.row(j) = dots(along_, right).transpose();
+  }
+}
+
+Eigen::VectorXd RigidMotions::dots(const std::vector<VecHandle>& with, Vec x) const {
+  std::vector<Vec> vectors(with.begin(), with.end());
+  Eigen::VectorXd out(static_cast<Eigen::Index>(vectors.size()));
+  WARMSLIP_PETSC(VecMDot(x, static_cast<PetscInt>(vectors.size()), vectors.data(), out.data()));
+  return out;
+}
+
+void RigidMotions::combine(const std::vector<VecHandle>& of, const Eigen::VectorXd& by, Vec x) const {
+  std::vector<Vec> vectors(of.begin(), of.end());
+  WARMSLIP_PETSC(VecMAXPY(x, static_cast<PetscInt>(vectors.size()), by.data(), vectors.data()));
+}
+
+Eigen::VectorXd RigidMotions::load(Vec external, Vec all) const { return dots(motions_, external) - dots(inner_, all); }
+
+Eigen::VectorXd RigidMotions::alone(const Eigen::VectorXd& load) const {
+  const Eigen::FullPivLU<Eigen::MatrixXd> lu(inertia_);
+  if (inertia_.isZero(0) || !lu.isInvertible())
+    throw SolveFailed("nothing holds the body: it has no support, no inertia and no contact");
+  return lu.solve(load);
+}
+
+void RigidMotions::add(const Eigen::VectorXd& motions, Vec inner, Vec x) const {
+  combine(inner_, -motions, inner);
+  WARMSLIP_PETSC(VecCopy(inner, x));
+  combine(motions_, motions, x);
+}
+
+void RigidMotions::remove(Vec x) const {
+  if (!empty()) combine(motions_, -gram_.ldlt().solve(dots(motions_, x)), x);
+}
+
+template RigidMotions::RigidMotions(const Layout<2>&, int, const std::vector<std::string>&, const std::vector<std::string>&);
+template RigidMotions::RigidMotions(const Layout<3>&, int, const std::vector<std::string>&, const std::vector<std::string>&);
+
+}  // namespace warmslip
