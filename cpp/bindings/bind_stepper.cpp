@@ -182,6 +182,7 @@ void bind_stepper(py::module_& m) {
   item("books_seconds", &Cost::books_seconds);
   item("steps", &Cost::steps);
   item("refinements", &Cost::refinements);
+  item("estimates", &Cost::estimates);
   item("substitutions", &Cost::substitutions);
   item("factorizations", &Cost::factorizations);
   item("dense_factorizations", &Cost::dense_factorizations);

@@ -170,10 +170,10 @@ def _blocks(scene: Scene) -> Iterator[str]:
             yield (
                 "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
             )
-        if not scene.supports.displacement:
+        if not scene.supports.displacement and not any(contact.stiffness for contact in scene.contacts):
             yield (
-                "supports.displacement: the momentum operator is singular without support and without inertia; "
-                "clamp a part or give inertia.density > 0"
+                "supports.displacement: nothing holds the body: it has no support, no inertia and no contact; "
+                "clamp a part, give inertia.density > 0 or a [contact] that it rests on"
             )
     if heat is None:
         cold: dict[str, Any] = {

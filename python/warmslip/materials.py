@@ -110,7 +110,7 @@ def contact_part(contact: ContactTable, own: Watched | None = None) -> Any:
     own = own or Watched()
     if contact.stiffness is not None:
         compliance = _core.NormalCompliance(
-            stiffness=contact.stiffness,
+            stiffness=contact.compliance,
             exponent=contact.exponent,
             most=np.inf if contact.pressure_limit is None else contact.pressure_limit,
             custom=own.compliance,

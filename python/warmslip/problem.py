@@ -202,9 +202,9 @@ def discretise(
     )
     layout = of_dim("Layout", d)(comm, mesh)
     surface = of_dim("ContactSurface", d)(layout, problem)
-    touched = set(surface.contacts)
-    for i, contact in enumerate(scene.contacts):
-        if contact.stiffness is not None and i not in touched:
+    held = {node for part in scene.supports.displacement for node in np.unique(mesh.parts[part])}
+    for contact in scene.contacts:
+        if contact.stiffness is not None and held.issuperset(np.unique(mesh.parts[contact.part])):
             raise ValueError(
                 f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
             )

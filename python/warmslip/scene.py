@@ -136,7 +136,7 @@ class Scene(t.Table):
             problems.append("contact: one contact part with a stiffness is needed here")
         else:
             contact = self.contacts[0]
-            if contact.exponent != 1 or contact.pressure_limit or contact.heats:
+            if contact.rigid or contact.exponent != 1 or contact.pressure_limit or contact.heats:
                 problems.append("contact: only linear compliance with a constant conductance can be judged here")
             if contact.friction and contact.friction != t.FrictionTable(coefficient=contact.friction.coefficient):
                 problems.append("contact.friction: only Coulomb's law with a constant coefficient can be judged here")

@@ -34,6 +34,10 @@ def _listed(value: Any) -> str:
     return "one" if isinstance(value, dict) else "several"
 
 
+def _word(value: Any) -> str:
+    return "word" if isinstance(value, str) else "number"
+
+
 # c stands for c times the identity
 Tensor = Annotated[Matrix | float, BeforeValidator(_number_or_matrix)]
 
@@ -339,13 +343,18 @@ class FrictionHeatTable(Table):
 class ContactTable(Table):
     """Contact on `part`: p_nu(r) = min(stiffness max(r, 0)^exponent, pressure_limit), friction, heat.
 
-    Without a stiffness the part only exchanges heat.
+    A rigid foundation lets nothing in and bears any pressure (Signorini). Without a stiffness the part only exchanges heat.
     """
 
     part: str
     """Boundary part that touches or exchanges heat."""
-    stiffness: NonNegative | None = None
-    """c_nu, pressure per penetration to the power of the exponent."""
+    stiffness: (
+        Annotated[
+            Annotated[NonNegative, Tag("number")] | Annotated[Literal["rigid"], Tag("word")], Discriminator(_word)
+        ]
+        | None
+    ) = None
+    """c_nu, pressure per penetration to the power of the exponent; or "rigid", its limit."""
     exponent: Annotated[float, Field(strict=True, ge=1, allow_inf_nan=False)] = 1.0
     """1 is linear compliance; larger exponents begin softly."""
     pressure_limit: Positive | None = None
@@ -357,6 +366,22 @@ class ContactTable(Table):
     friction: FrictionTable | None = None
     heat_exchange: ExchangeTable | None = None
     friction_heating: FrictionHeatTable | None = None
+
+    @model_validator(mode="after")
+    def _bends(self) -> Self:
+        if self.rigid and (self.exponent != 1 or self.pressure_limit is not None):
+            raise ValueError("a rigid foundation has no exponent and no pressure_limit; remove them, or give a stiffness")
+        return self
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the foundation lets nothing in."""
+        return self.stiffness == "rigid"
+
+    @property
+    def compliance(self) -> float:
+        """c_nu as a number, infinite of a rigid foundation and 0 where there is no contact."""
+        return math.inf if self.rigid else float(self.stiffness or 0.0)
 
     @property
     def points(self) -> int:

@@ -79,6 +79,7 @@ struct Cost {
   double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0, books_seconds = 0;
   int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0,
       newton_iterations = 0;
+  int estimates = 0;  ///< steps whose digits were estimated, whose substitutions are not among those above
   double factor_bytes = 0;
 };
 
@@ -140,6 +141,7 @@ class Stepper {
   bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
   bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
   bool measured_now() const;
+  int substitutions() const;
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;

@@ -197,8 +197,11 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     if (!(ledger.heat_defect < 0.5 * before)) break;
   }
   if (!measured_now()) return ledger;
+  const int before = substitutions();
   if (momentum_ && !refined) correct_motion(loads, ledger, contact, false);
   if (heat_ && !warmed) correct_heat(inputs(loads, contact), false);
+  cost_.substitutions -= substitutions() - before;
+  ++cost_.estimates;
   return ledger;
 }
 
@@ -274,9 +277,6 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   if (reactive() && loads.foundation.size() != surface_.points())
     throw std::invalid_argument("the foundation's temperature needs one value a contact point");
   const Timed timed(cost_.step_seconds);
-  const auto substitutions = [&] {
-    return (momentum_ ? momentum_->substitutions() : 0) + (heat_ ? heat_->substitutions() : 0);
-  };
   const int before = substitutions();
   errors_ = {};
   ContactSolution<d> contact;
@@ -327,6 +327,11 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Ledger& ledger,
   time_ += options_.k;
   ++cost_.steps;
   return report;
+}
+
+template <int d>
+int Stepper<d>::substitutions() const {
+  return (momentum_ ? momentum_->substitutions() : 0) + (heat_ ? heat_->substitutions() : 0);
 }
 
 template <int d>
