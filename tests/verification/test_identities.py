@@ -38,7 +38,7 @@ def check(one: Scene, **how: Any) -> warmslip.Result:
     result = warmslip.run(one, **how)
     assert result.outcome == "right"
     worst = {name: result.summary["identities"][name] for name in IDENTITIES}
-    assert worst["law"] <= 1e-11 + result.summary["identities"]["law_floor"], worst
+    assert worst["law"] <= 1e-11, worst
     assert max(v for k, v in worst.items() if k != "law") <= 1e-11, worst
     return result
 

@@ -114,7 +114,8 @@ struct OwnCompliance {
 ///   normal      see NormalResidual
 ///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + w_tau / own),   T = weight times the friction bound
 /// The bound reads the pressure from the unknown force, max(lambda_nu, 0) / weight, and not from the penetration: an
-/// iterate whose penetration no force has stopped yet would have far too large a bound. Regularised friction has
+/// iterate whose penetration no force has stopped yet would have far too large a bound. A bound that depends on the
+/// speed is taken at the speed s with T(s) + s / own = |lambda_tau + w_tau / own|, its resolvent. Regularised friction has
 /// lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
 template <int d>
 struct PointResidual {

@@ -81,7 +81,7 @@ class ContactSolver {
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
   void factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution);
   Eigen::VectorXd direction(const Linearisation& at) const;
-  bool newton(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);

@@ -293,8 +293,8 @@ template <int d>
 void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
   double work = 0;
-  enum { defect, backward, acting };
-  std::array<double, 3> most{};
+  enum { defect, backward, acting, applied, inner };
+  std::array<double, 5> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
   const double u = std::max(largest(after.u), largest(before.u)), w = largest(after.w),
                w_both = std::max(w, largest(before.w)), theta = largest(in.coupling_theta);
@@ -327,6 +327,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         if (!left.allFinite()) raise(backward, std::numeric_limits<double>::infinity());
       }
       work += magnitude.dot(Point<d>(in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()));
+      raise(applied, Point<d>(moved + given + expansion.cwiseAbs()).maxCoeff());
+      raise(inner, Point<d>(u * at(elastic_rows_) + w * at(viscous_rows_)).maxCoeff());
       raise(acting, std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(),
                               at(*e0).cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff(),
                               expansion.cwiseAbs().maxCoeff()}));
@@ -341,7 +343,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
   l.force_defect = relative(most[defect], most[acting]);
-  l.force_scale = most[acting];
+  // where no force is applied, inner forces of a size that rounding of u makes are none
+  l.force_scale = most[applied] > 0 ? most[acting] : std::max(most[acting], 1e-11 * most[inner]);
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.

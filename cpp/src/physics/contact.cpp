@@ -77,6 +77,27 @@ NormalResidual normal_residual(const NormalCompliance& law, double weight, doubl
   return {value, 1 / (1 + stiff), -slope / (1 + stiff), true};
 }
 
+namespace {
+
+// The slip speed s >= 0 at which bound(s) + beta s is `trial`, and the bound there: the resolvent of a bound that
+// depends on the speed. The least such speed is taken where the bound falls faster than beta.
+FrictionBound slipping(const Friction& law, double pressure, double weight, double beta, double trial) {
+  double low = 0, high = trial / beta, s = 0;
+  FrictionBound at{};
+  for (int i = 0; i < 60; ++i) {
+    at = law.bound(pressure, s);
+    const double excess = weight * at.value + beta * s - trial;
+    if (std::abs(excess) <= 4 * std::numeric_limits<double>::epsilon() * trial) break;
+    (excess > 0 ? high : low) = s;
+    const double next = s - excess / (weight * at.by_speed + beta);
+    s = next > low && next < high ? next : 0.5 * (low + high);
+    if (!(high - low > 1e-15 * high)) break;
+  }
+  return at;
+}
+
+}  // namespace
+
 template <int d>
 PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
                           const Point<d>& force, const Point<d>& velocity) {
@@ -86,14 +107,10 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   const double r = point.penetration + k * velocity.dot(nu), lambda = force.dot(nu), beta = 1 / own.tangential;
   const NormalResidual across = normal_residual(law.compliance, point.weight, own.normal, lambda, r);
   const Point<d> slip = tangential * velocity;
-  const double speed = slip.norm();
-  const FrictionBound friction = law.friction.bound(std::max(lambda, 0.0) / point.weight, speed);
-  const double bound = point.weight * friction.value;
-  // derivatives of the bound by the force and by the velocity
-  const Point<d> widening = (lambda > 0 ? friction.by_pressure : 0.0) * nu;
-  const Point<d> weakening = friction.by_speed != 0 && speed > 0
-                                 ? Point<d>(point.weight * friction.by_speed / speed * slip)
-                                 : Point<d>(Point<d>::Zero());
+  const double speed = slip.norm(), pressure = std::max(lambda, 0.0) / point.weight;
+  const bool smooth = law.friction.regularisation > 0;
+  FrictionBound friction = law.friction.bound(pressure, smooth ? speed : 0.0);
+  double bound = point.weight * friction.value;
 
   PointResidual<d> out;
   out.touching = across.touching;
@@ -111,9 +128,11 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
     out.apart = !out.touching && across.by_force == 1 && across.by_penetration == 0;
     out.value += tangential * force;
     out.by_force += tangential;
-  } else if (law.friction.regularisation > 0) {
+  } else if (smooth) {
     const double blunt = std::hypot(speed, law.friction.regularisation);
-    const Point<d> direction = slip / blunt;
+    const Point<d> direction = slip / blunt, widening = (lambda > 0 ? friction.by_pressure : 0.0) * nu,
+                   weakening = speed > 0 ? Point<d>(point.weight * friction.by_speed / speed * slip)
+                                         : Point<d>(Point<d>::Zero());
     out.status = speed < law.friction.regularisation ? Status::stick : Status::slip;
     out.value += tangential * force - bound * direction;
     out.by_force += tangential - direction * widening.transpose();
@@ -125,15 +144,22 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
     out.by_velocity -= beta * tangential;
   } else {
     out.status = Status::slip;
+    if (law.friction.custom || law.friction.speed > 0) {
+      friction = slipping(law.friction, pressure, point.weight, beta, size);
+      bound = point.weight * friction.value;
+    }
     const Point<d> direction = trial / size;
+    // how the bound follows the trial force, and the pressure
+    const double follows = point.weight * friction.by_speed / (point.weight * friction.by_speed + beta);
+    const Point<d> widening = (1 - follows) * (lambda > 0 ? friction.by_pressure : 0.0) * nu;
     for (int a = 0; a < d && out.slip_sign == 0; ++a)
       if (std::abs(direction[a]) > 0.5) out.slip_sign = direction[a] > 0 ? a + 1 : -(a + 1);
     // the direction turns only for d = 3
-    const Tensor2<d> turn = d == 2 ? Tensor2<d>(Tensor2<d>::Zero())
-                                   : Tensor2<d>(bound / size * (tangential - direction * direction.transpose()));
+    Tensor2<d> turn = follows * (direction * direction.transpose());
+    if (d == 3) turn += bound / size * (tangential - direction * direction.transpose());
     out.value += tangential * force - bound * direction;
     out.by_force += tangential - turn - direction * widening.transpose();
-    out.by_velocity -= beta * turn + direction * weakening.transpose();
+    out.by_velocity -= beta * turn;
   }
   return out;
 }

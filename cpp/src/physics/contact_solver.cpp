@@ -228,20 +228,31 @@ bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<
 }
 
 template <int d>
-bool ContactSolver<d>::newton(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
   Linearisation at = linearise(problem, solution.force, solution.rigid);
   const Eigen::Index all = compliance_.rows();
+  ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
     // the motions that are solved for apart are linear and exact after a full step
     const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
     const double forces = rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
-    if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) break;
-    if (step == options_.newton_steps) return false;
+    if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
+      solution.status.clear();
+      for (const auto& point : at.points) solution.status.push_back(point.status);
+      const bool enough = solution.law_residual <= 1e-2 * options_.tolerance || best.converged;
+      if (!best.converged || solution.law_residual < best.law_residual) best = solution;
+      best.converged = true;
+      if (enough) break;
+    } else if (best.converged) {
+      break;
+    }
+    if (step >= options_.newton_steps && !best.converged) return false;
     factor(problem, at, solution);
     const Eigen::VectorXd change = direction(at);
     if (!change.allFinite() || solution.unsupported) {
       factored_.clear();
+      if (best.converged) break;
       return false;
     }
     ++solution.iterations;
@@ -249,7 +260,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, ContactSolution<
     for (double length = 1;; length /= 2) {
       Linearisation next = linearise(problem, solution.force + length * change.head(all),
                                      solution.rigid + length * change.tail(rigid_.count()));
-      if (next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
+      if (!line_search || next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
         solution.force += length * change.head(all);
         solution.rigid += length * change.tail(rigid_.count());
         at = std::move(next);
@@ -257,8 +268,9 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, ContactSolution<
       }
     }
   }
-  solution.status.clear();
-  for (const auto& point : at.points) solution.status.push_back(point.status);
+  best.iterations = solution.iterations;
+  best.factorizations = solution.factorizations;
+  solution = std::move(best);
   return true;
 }
 
@@ -343,7 +355,9 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     inertia = stronger;
     if (step % 200 == 199) {
       solution.force = force;
-      if (newton(problem, solution)) return true;
+      if (newton(problem, true, solution)) return true;
+      solution.force = force;
+      if (newton(problem, false, solution)) return true;
     }
   }
   return false;
@@ -405,7 +419,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     solution.converged = method();
     if (!solution.converged) solution.force = force;
   };
-  attempt(Stage::newton, [&] { return newton(problem, solution); });
+  attempt(Stage::newton, [&] { return newton(problem, true, solution); });
   if (rigid_.count() > 0)  // a body that only contact holds: again with all points pressed
     attempt(Stage::restart, [&] {
       solution.rigid.setZero();
@@ -418,8 +432,9 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
         solution.force.template segment<d>(row) =
             (share + (give > 0 ? 2 * std::max(-r, 0.0) / give : 0.0)) * point.normal;
       }
-      return newton(problem, solution);
+      return newton(problem, true, solution);
     });
+  attempt(Stage::restart, [&] { return newton(problem, false, solution); });
   // again from no force, with other scales of the tangential rows
   for (const double boldness : {1.0, 0.1, 10.0, 0.01})
     attempt(Stage::restart, [&] {
@@ -427,7 +442,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       factored_.clear();
       solution.force.setZero();
       solution.rigid.setZero();
-      const bool found = newton(problem, solution);
+      const bool found = newton(problem, true, solution);
       if (boldness_ != 1) factored_.clear();
       boldness_ = 1;
       return found;
