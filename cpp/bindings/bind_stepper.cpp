@@ -152,6 +152,7 @@ void bind_stepper(py::module_& m) {
   term("law_residual", &Ledger::law_residual);
   term("force_defect", &Ledger::force_defect);
   term("heat_defect", &Ledger::heat_defect);
+  term("force_scale", &Ledger::force_scale);
   ledger.attr("terms") = py::tuple(terms);
 
   auto errors = py::class_<Errors>(m, "Errors",

@@ -9,7 +9,7 @@ import numpy.typing
 import petsc4py.PETSc
 import scipy.sparse
 import typing
-__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress']
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress']
 class Diagonal:
     """
     Members:
@@ -700,6 +700,23 @@ class Symmetry:
     @property
     def value(self) -> int:
         ...
+class Errors:
+    """
+    Estimated relative errors of the fields of one step; nan is absent or not measured.
+    """
+    fields: typing.ClassVar[tuple[str, ...]] = ('u', 'theta', 'stress', 'contact_force')
+    @property
+    def contact_force(self) -> float:
+        ...
+    @property
+    def stress(self) -> float:
+        ...
+    @property
+    def theta(self) -> float:
+        ...
+    @property
+    def u(self) -> float:
+        ...
 class Factor:
     """
     A factored operator with some unknowns held apart (collective).
@@ -793,6 +810,8 @@ class Outcome:
     
       precision_lost
     
+      unsupported
+    
       solver_failed
     """
     __members__: typing.ClassVar[dict[str, Outcome]]
@@ -802,6 +821,7 @@ class Outcome:
     precision_lost: typing.ClassVar[Outcome]
     right: typing.ClassVar[Outcome]
     solver_failed: typing.ClassVar[Outcome]
+    unsupported: typing.ClassVar[Outcome]
     @typing.overload
     def __eq__(self, other: Outcome) -> bool:
         ...
@@ -844,7 +864,7 @@ class Stage:
     
       newton
     
-      line_search
+      restart
     
       fixed_point
     
@@ -853,9 +873,9 @@ class Stage:
     __members__: typing.ClassVar[dict[str, Stage]]
     enumeration: typing.ClassVar[Stage]
     fixed_point: typing.ClassVar[Stage]
-    line_search: typing.ClassVar[Stage]
     newton: typing.ClassVar[Stage]
     none: typing.ClassVar[Stage]
+    restart: typing.ClassVar[Stage]
     @typing.overload
     def __eq__(self, other: Stage) -> bool:
         ...
@@ -921,7 +941,7 @@ class Ledger:
     """
     Terms and relative residuals of the balances of one step.
     """
-    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'support_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'friction_heating', 'held', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'law_floor', 'energy_floor', 'force_floor')
+    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'support_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'friction_heating', 'held', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'force_defect', 'heat_defect', 'force_scale')
     @property
     def conducted(self) -> float:
         ...
@@ -953,10 +973,19 @@ class Ledger:
     def expansion_work(self) -> float:
         ...
     @property
+    def force_defect(self) -> float:
+        ...
+    @property
     def force_residual(self) -> float:
         ...
     @property
+    def force_scale(self) -> float:
+        ...
+    @property
     def friction(self) -> float:
+        ...
+    @property
+    def friction_heating(self) -> float:
         ...
     @property
     def gap_work(self) -> float:
@@ -968,10 +997,16 @@ class Ledger:
     def heat_damping(self) -> float:
         ...
     @property
+    def heat_defect(self) -> float:
+        ...
+    @property
     def heat_residual(self) -> float:
         ...
     @property
     def heating(self) -> float:
+        ...
+    @property
+    def held(self) -> float:
         ...
     @property
     def inertia_damping(self) -> float:
@@ -981,15 +1016,6 @@ class Ledger:
         ...
     @property
     def kinetic_change(self) -> float:
-        ...
-    @property
-    def law_floor(self) -> float:
-        ...
-    @property
-    def energy_floor(self) -> float:
-        ...
-    @property
-    def force_floor(self) -> float:
         ...
     @property
     def law_residual(self) -> float:
@@ -1004,19 +1030,13 @@ class Ledger:
     def support_work(self) -> float:
         ...
     @property
-    def friction_heating(self) -> float:
-        ...
-    @property
-    def held(self) -> float:
-        ...
-    @property
     def viscous(self) -> float:
         ...
 class Cost:
     """
     What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
     """
-    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'books_seconds', 'steps', 'refinements', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'books_seconds', 'steps', 'refinements', 'estimates', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
     @property
     def books_seconds(self) -> float:
         ...
@@ -1025,6 +1045,9 @@ class Cost:
         ...
     @property
     def dense_factorizations(self) -> int:
+        ...
+    @property
+    def estimates(self) -> int:
         ...
     @property
     def factor_bytes(self) -> float:
@@ -1061,6 +1084,11 @@ class StepReport2:
     What one step did.
     """
     @property
+    def errors(self) -> Errors:
+        """
+        estimated, of the fields
+        """
+    @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
         its tangential part, (d)
@@ -1085,13 +1113,13 @@ class StepReport2:
     def open(self) -> int:
         ...
     @property
+    def outcome(self) -> Outcome:
+        ...
+    @property
     def reason(self) -> str:
         """
         of an outcome that is not right, in words
         """
-    @property
-    def outcome(self) -> Outcome:
-        ...
     @property
     def slip(self) -> int:
         ...
@@ -1180,6 +1208,11 @@ class StepReport3:
     What one step did.
     """
     @property
+    def errors(self) -> Errors:
+        """
+        estimated, of the fields
+        """
+    @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         its tangential part, (d)
@@ -1204,13 +1237,13 @@ class StepReport3:
     def open(self) -> int:
         ...
     @property
+    def outcome(self) -> Outcome:
+        ...
+    @property
     def reason(self) -> str:
         """
         of an outcome that is not right, in words
         """
-    @property
-    def outcome(self) -> Outcome:
-        ...
     @property
     def slip(self) -> int:
         ...

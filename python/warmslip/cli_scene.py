@@ -68,6 +68,11 @@ def _refuse_dashless(petsc: str) -> None:
         before = word
 
 
+def _digits(found: dict[str, float]) -> str:
+    """How many digits of each field can be trusted."""
+    return "digits: " + ", ".join(f"{name.replace('_', ' ')} {int(value)}" for name, value in found.items())
+
+
 def _told(summary: dict[str, Any]) -> str:
     """The end of a run in a few words; of one that stopped, the residuals of the step that was not taken."""
     failure = summary["failure"]
@@ -75,9 +80,11 @@ def _told(summary: dict[str, Any]) -> str:
         return f"after {summary['steps']} of {summary['stamp']['scene']['time']['steps']} steps, --resume goes on"
     if failure is None:
         worst = max(summary["identities"][i] for i in ("energy", "heat", "force", "law"))
-        return f"{summary['steps']} steps, worst identity {worst:.1e}"
+        return f"{summary['steps']} steps, worst identity {worst:.1e}, {_digits(summary['digits'])}"
     words = [failure["reason"]] if failure["reason"] else []
-    words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason")]
+    words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason", "digits")]
+    if "digits" in failure:
+        words.append(_digits(failure["digits"]))
     return f"step {failure['step']} was not taken ({', '.join(words)})"
 
 

@@ -304,4 +304,4 @@ def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
         **{"mesh.file": str(tmp_path / "bent.msh"), "mesh.n": None, "mesh.shape": None, "contact.part": "shoe"}
     )
     (said,) = [s for s in estimate.measured(file).suspicious if "differ in normal" in s]
-    assert said.startswith("9 contact points at 8 nodes: around 1 of them")
+    assert said.startswith("10 contact points at 9 nodes: around 1 of them")

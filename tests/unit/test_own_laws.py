@@ -125,20 +125,15 @@ def test_a_law_that_fails_in_the_run_ends_it_with_the_place(
 
 
 def test_a_law_may_end_beyond_what_is_reached(small: Small) -> None:
-    """The scale of a step asks for the tangent where the body would be without contact."""
+    """No iterate asks for more than a little beyond the answer."""
     scene = small(contact__stiffness=STIFF, loads__body=[0.0, -1.0], time__steps=8, time__end=8.0)
-    seen: list[float] = []
-
-    def recorded(r: float) -> Sequence[float]:
-        seen.append(r)
-        return linear(r)
 
     def ends(r: float) -> Sequence[float]:
         return linear(r) if r < 1.01 * reached else [math.exp(1e3)]
 
-    job = warmslip.Run(scene, laws={"bottom": Law(compliance=recorded)})
+    job = warmslip.Run(scene, laws={"bottom": Law(compliance=linear)})
     reached = max(report.max_penetration for _, report in job.steps())
-    assert job.outcome == "right" and max(seen) > 1.01 * reached > 0
+    assert job.outcome == "right" and reached > 0
     result = warmslip.run(scene, laws={"bottom": Law(compliance=ends)})
     assert result.right and np.array_equal(result.u, job.discretisation.field(job.stepper.u))
 

@@ -218,7 +218,7 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
 def test_a_verdict_needs_something_to_judge(tmp_path: Path) -> None:
     nothing = dict(studies=[], manufactured_table=None, readings=None, extremes=None, expected={})
     assert not judge.verdict(**nothing)["passed"]
-    books = dict.fromkeys(IDENTITIES, 1e-12) | {"law_floor": 1e-8, "energy_floor": 0.0, "law": 1e-8}
+    books = dict.fromkeys(IDENTITIES, 1e-12)
     cells = [{"ladder": "gap g", "value": 0.0, "verdict": v} | books for v in ("right", "WRONG")]
     assert judge.closed(cells[0])
     for name, size in {"law": 2e-8, "heat": 1e-8, "energy": 1e-8, "force": math.nan}.items():

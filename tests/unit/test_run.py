@@ -201,16 +201,19 @@ def test_a_compliance_that_cannot_be_solved_for_is_refused(small: MakeScene, opt
 
 @pytest.mark.parametrize("field", ["heat", "momentum"])
 def test_loose_iterations_are_seen(small: MakeScene, options: dict[str, str], field: str) -> None:
-    """Conjugate gradients leave a residual that is orthogonal to the answer: sums close, the equations do not."""
+    """Conjugate gradients leave a residual that is orthogonal to the answer: sums close, the equations do not. Refinement
+    mends it, and says so."""
     for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_rtol": "1e-3"}.items():
         options[f"{field}_{key}"] = value
     free = {"heat__expansion__tensor": [[0.0, 0.0], [0.0, 0.0]], "supports__temperature": []}
     alone = {"contact__gap": 1.0, "contact__heat_exchange__conductance": 0.0, "heat__source": 0.0}
     sheared = {"loads__body": [1.0, 0.0], "loads__traction": {}, "heat__heating__tensor": [[1.0, 0.0], [0.0, 1.0]]}
     scene = small(mesh__n=16, mesh__diagonal="crisscross", time__steps=8, **free, **alone, **sheared)
-    result = warmslip.run(scene, backend="petsc")
-    assert result.outcome == "identity_violated"
-    assert result.summary["failure"]["heat" if field == "heat" else "force"] > 1e-8
+    result, direct = warmslip.run(scene, backend="petsc"), warmslip.run(scene)
+    assert result.right and result.summary["cost"]["refinements"] >= 8 and direct.summary["cost"]["refinements"] == 0
+    for name in FIELDS:
+        exact = getattr(direct, name)
+        assert np.abs(getattr(result, name) - exact).max() <= 1e-9 * np.abs(exact).max()
 
 
 def test_loose_iterations_are_seen_where_every_sum_closes(small: MakeScene, options: dict[str, str]) -> None:
@@ -225,44 +228,43 @@ def test_loose_iterations_are_seen_where_every_sum_closes(small: MakeScene, opti
     assert result.summary["failure"]["force"] > 1e-8
 
 
-@pytest.mark.parametrize(("speed", "outcome"), [(1.0, "right"), (1e10, "precision_lost")])
-def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float, outcome: str) -> None:
-    """Its displacement has sixteen digits; what is left of them in the strain is stated."""
+@pytest.mark.parametrize("speed", [1.0, 1e6, 1e12])
+def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float) -> None:
+    """Its rigid motion is solved for apart: the strain does not feel how far it flies, until the velocity has no digits."""
     pulled = {"loads__body": [0.0, 0.0], "loads__traction": {"left": [-1e-3, 0.0], "right": [1e-3, 0.0]}}
     result = warmslip.run(
         small("isotropic", supports__displacement=[], contact__gap=1e3, initial__velocity=[speed, 0.0], **pulled)
     )
-    assert result.outcome == outcome
-    if outcome == "precision_lost":
-        assert "rounding hides its strain" in result.summary["failure"]["reason"]
-        assert result.summary["failure"]["force_floor"] > 1e-6
+    if speed > 1e10:
+        assert result.outcome == "precision_lost" and result.summary["failure"]["digits"]["stress"] < 4
+        return
+    still = warmslip.run(small("isotropic", supports__displacement=[], contact__gap=1e3, **pulled))
+    assert result.right and result.summary["digits"]["stress"] > (5 if speed > 1 else 10)
+    moved = np.array([speed, 0.0])
+    assert np.abs(result.w - still.w - moved).max() <= 2e-14 * speed
 
 
 def test_a_foundation_out_of_reach_costs_no_digits(small: MakeScene) -> None:
     far, near = (warmslip.run(small(contact__gap=gap)) for gap in (1e9, 1.0))
-    assert (far.outcome, far.summary["identities"]["law_floor"]) == ("right", 0.0)
+    assert far.right and far.summary["digits"]["u"] > 10
     assert np.abs(far.u - near.u).max() <= 1e-14 * np.abs(near.u).max()
 
 
-def test_stiffness_that_is_not_touched_excuses_nothing(small: MakeScene) -> None:
-    """A needle without digits in its energy is refused for a stiff foundation as for a soft one, as long as it is open."""
-    for stiffness in (1e4, 1e10):
-        needle = {"mesh__lengths": [1e-4, 1.0], "contact__gap": 0.1, "contact__stiffness": stiffness}
-        result = warmslip.run(small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, **needle))
-        assert result.outcome == "identity_violated"
-        assert result.summary["failure"]["energy_floor"] == 16 * result.summary["failure"]["force_floor"] < 1e-8
-
-
-def test_stiffness_that_is_hardly_touched_excuses_little(small: MakeScene) -> None:
-    """A needle that stands on a foundation whose law is known to 1e-6: its energy, nearly all of shear, is not excused."""
-    standing = {"mesh__lengths": [1e-4, 1.0], "loads__traction": {"left": [1.4, 0.0], "right": [-0.8, 0.0]}}
-    result = warmslip.run(
-        small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, contact__stiffness=2e12, **standing)
-    )
-    assert result.outcome == "identity_violated"
-    failure = result.summary["failure"]
-    assert failure["law_floor"] > 1e-7 > 10 * failure["energy_floor"]
-    assert 1e-9 < failure["energy"] < 4 * failure["law_floor"]
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"contact__gap": 0.1, "contact__stiffness": 1e4},
+        {"contact__gap": 0.1, "contact__stiffness": 1e10},
+        {"loads__traction": {"left": [1.4, 0.0], "right": [-0.8, 0.0]}, "contact__stiffness": 2e12},
+    ],
+)
+def test_a_needle_has_the_digits_it_states(small: MakeScene, keys: dict[str, Any]) -> None:
+    """Nearly all of its energy is cancelled; two factorizations agree to the digits that the summary names."""
+    scene = small("isotropic", mesh__n=8, time__steps=1, time__end=0.125, mesh__lengths=[1e-4, 1.0], **keys)
+    one, other = warmslip.run(scene), warmslip.run(scene, backend="petsc")
+    stated = one.summary["digits"]["u"]
+    assert one.right and other.right and 4 < stated < 9
+    assert np.abs(one.u - other.u).max() <= 10 ** (1 - stated) * np.abs(one.u).max()
 
 
 def test_an_operator_without_inverse_is_refused(small: MakeScene) -> None:
@@ -285,21 +287,26 @@ def test_a_state_that_is_not_finite_is_said(small: MakeScene) -> None:
 
 
 @pytest.mark.parametrize(
-    ("outcome", "keys"),
+    ("outcome", "loose", "keys"),
     [
-        ("identity_violated", {"mesh__lengths": [1e-4, 1.0]}),  # bending of a needle: no digits left in the energy
-        ("precision_lost", {"contact__stiffness": 1e14}),
+        ("identity_violated", {"heat_ksp_type": "cg", "heat_pc_type": "none", "heat_ksp_rtol": "0.9"}, {}),
+        ("precision_lost", {}, {"mesh__lengths": [1e-6, 1.0]}),  # bending of a needle: no digits left in u
     ],
 )
 def test_a_step_that_does_not_close_its_books_is_not_taken(
-    small: MakeScene, outcome: str, keys: dict[str, object]
+    small: MakeScene, options: dict[str, str], outcome: str, loose: dict[str, str], keys: dict[str, object]
 ) -> None:
-    result = warmslip.run(small(mesh__n=8, time__steps=8, **keys))
+    for key, value in loose.items():
+        options[key] = value
+    result = warmslip.run(small(mesh__n=8, time__steps=8, **keys), backend="petsc")
     assert (result.outcome, result.right) == (outcome, False)
     failure = result.summary["failure"]
     assert result.summary["steps"] == failure["step"] - 1
-    assert max(failure[key] for key in (*runner.IDENTITIES, *runner.FLOORS)) > 1e-9
-    assert all(value <= 1e-9 for value in result.summary["identities"].values())
+    if outcome == "precision_lost":
+        assert failure["digits"]["u"] < 4 and "fewer than four digits of u" in failure["reason"]
+    else:
+        assert failure["heat"] > 1e-10 and "heat stays open" in failure["reason"]
+    assert all(value <= 1e-10 for value in result.summary["identities"].values())
     if failure["step"] == 1:
         assert not result.u.any()  # the initial state is kept
 

@@ -99,7 +99,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contact.friction_heating": {"share": 0.5}, "time.coupling": "monolithic"}, "needs 'staggered' or 'lagged'"),
     ({"inertia": None, "elasticity": None, "viscosity": None, "heat": None}, "there is neither motion nor heat"),
     ({"inertia": None, "elasticity": None, "viscosity": None}, "loads.body: a body without elasticity"),
-    ({"inertia": None, "supports.displacement": []}, "the momentum operator is singular"),
+    ({"inertia": None, "supports.displacement": [], "contact.stiffness": 0.0}, "nothing holds the body"),
     ({"contact": [{"part": "bottom", "stiffness": 1.0}, {"part": "bottom", "stiffness": 2.0}]}, "has two laws"),
     ({"contact": [{"part": "bottom", "stiffness": -1.0}]}, "contact.0.stiffness = -1"),
     ({"contact": [{"part": "bottom", "stiffnes": 1.0}]}, "contact.0.stiffnes: unknown key; did you mean 'stiffness'?"),

@@ -27,9 +27,8 @@ def test_energy_that_grows_is_seen() -> None:
 
 def test_two_methods_give_one_answer() -> None:
     hot = {"contact__heat_exchange__foundation_temperature": 10.0}
-    assert audit_runs.other_answer(small(**hot)) <= 1e-10
-    with pytest.raises(RuntimeError, match="without Newton ended"):
-        audit_runs.other_answer(small(contact__stiffness=1e9, **hot))
+    for stiffness in (1e4, 1e9, 1e15):
+        assert audit_runs.other_answer(small(contact__stiffness=stiffness, **hot)) <= 1e-10
 
 
 def test_the_audit_makes_its_claims(monkeypatch: pytest.MonkeyPatch) -> None:

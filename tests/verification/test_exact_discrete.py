@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference.exact_cases import CASES, COUPLINGS, SAFEGUARDS, SEVERAL, SOLID, Case
+from reference.exact_cases import CASES, COUPLINGS, CYCLES, SEVERAL, SOLID, Case
 from reference.exact_numbers import floats, zeros
 from reference.exact_scheme import DIGITS, OPEN, SLIP, STICK, Scheme, State
 
@@ -119,12 +119,12 @@ def test_the_exact_answer_obeys_the_inequality(name: str) -> None:
             assert min(scheme.inequality(old, wrong, [w + d / 10**9 for d in ways])) < 0
 
 
-@pytest.mark.parametrize("name", SAFEGUARDS)
-def test_where_newton_cycles_the_safeguards_find_the_only_answer(name: str) -> None:
-    stage, case = SAFEGUARDS[name]
-    found, stages = march(name, case)
+@pytest.mark.parametrize("name", CYCLES)
+def test_where_newton_once_cycled_it_finds_the_only_answer(name: str) -> None:
+    """With the threshold of the pressure in place of that of the unknown force, Newton's method cycled here."""
+    found, stages = march(name, CYCLES[name])
     check(found)
-    assert stage in stages
+    assert set(stages) <= {"none", "newton"}
 
 
 @pytest.mark.parametrize("name", SEVERAL)
@@ -160,10 +160,10 @@ def test_slip_in_any_direction(coupling: str) -> None:
     assert statuses >= {STICK, SLIP}
 
 
-@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5, 1e6, 1e8])
+@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5, 1e6, 1e8, 1e12])
 def test_stiffer_than_doubles_resolve(stiffness: float) -> None:
-    """Stick under a large step: digits are lost as w = z - W lam cancels. The core's answer is right to what is left, or
-    it names an outcome; the scheme's own answer exists and is unique for every stiffness."""
+    """Stick under a large step: digits are lost as w = z - W lam cancels. The core's answer is right to what is left; the
+    scheme's own answer exists and is unique for every stiffness."""
     keys = {
         "time.end": 32.0,
         "time.steps": 2,
@@ -179,13 +179,8 @@ def test_stiffer_than_doubles_resolve(stiffness: float) -> None:
     lost = 1 + max(
         float(p.weight * scheme.c_nu * scheme.k * scheme.W[2 * q, 2 * q]) for q, p in enumerate(scheme.points)
     )
-    if next(job.steps(), None):
-        assert all(
-            line.observed <= ROUND_OFF + 8 * np.finfo(float).eps * lost for line in lines("", scheme, job, state)
-        )
-    else:
-        assert stiffness > 1e4
-        assert job.outcome in ("contact_not_converged", "precision_lost")
+    assert next(job.steps(), None)
+    assert all(line.observed <= ROUND_OFF + 8 * np.finfo(float).eps * lost for line in lines("", scheme, job, state))
 
 
 @pytest.mark.parametrize(

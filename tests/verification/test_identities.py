@@ -129,7 +129,7 @@ def test_moving_gap() -> None:
 @pytest.mark.parametrize(("theta", "k"), [(1.0, 1e-5), (300.0, 1e-5), (300.0, 1e-7)])
 @pytest.mark.parametrize("tolerance", [None, 1e-8])
 def test_small_changes_of_large_contents(tolerance: float | None, theta: float, k: float) -> None:
-    """A warm body in short steps: rounding of its content is no defect, a heat system solved to 1e-8 only is one."""
+    """A warm body in short steps: rounding of its content is no defect, a heat system solved to 1e-8 only is refined."""
     steps = 20
     one = scene(
         **{"time__steps": steps, "time__end": k * steps, "initial__temperature": theta, "supports__temperature": []},
@@ -145,7 +145,8 @@ def test_small_changes_of_large_contents(tolerance: float | None, theta: float, 
     finally:
         for key in loose:
             options.delValue(key)
-    assert result.outcome == ("identity_violated" if loose else "right")
+    assert result.right and (result.summary["cost"]["refinements"] > 0 or not loose)
+    assert np.abs(result.theta - warmslip.run(one).theta).max() <= 2e-12 * theta
 
 
 @pytest.mark.parametrize("n", [5, 16, 32])

@@ -78,4 +78,4 @@ def test_every_invariance_has_a_line() -> None:
 
 def test_a_run_that_is_not_right_is_said_so() -> None:
     with pytest.raises(RuntimeError, match="precision_lost"):
-        invariances.restart_apart(scene(contact__stiffness=1e16))
+        invariances.restart_apart(scene(mesh__lengths=[1e-7, 1.0]))

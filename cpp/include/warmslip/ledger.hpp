@@ -37,7 +37,7 @@ struct Ledger {
   /// What the equations of the nodes leave over against the largest force (flow of heat) that acts in them: says whether
   /// the answer may be wrong, which an ill-conditioned operator makes possible in spite of round-off residuals.
   double force_defect, heat_defect;
-  double force_scale;  ///< the largest force that acts at a node
+  double force_scale;  ///< the largest force at a node beside its inertia: what errors of forces are compared with
 };
 
 struct StepInputs {

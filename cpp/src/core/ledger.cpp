@@ -235,6 +235,9 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
     // of the work of the force on all that its penetration is made of
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
     work_magnitude_ += std::abs(lambda) * (along(u1) + along(u0) + std::abs(after.gap[i]) + std::abs(before.gap[i]));
+    // and of that along the velocity, which is what the contact leaves of the free one
+    work_magnitude_ += in.contact_force.template segment<d>(i * d).norm() * in.k *
+                       (w.norm() + in.contact_free.template segment<d>(i * d).norm());
   }
   l.contact_change = l.contact - stored_before;
   l.law_residual = law_residual(problem, in.contact_force, w_points);
@@ -293,8 +296,8 @@ template <int d>
 void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   Resultant<d> force;
   double work = 0;
-  enum { defect, backward, acting, applied, inner };
-  std::array<double, 5> most{};
+  enum { defect, backward, acting, applied, strained, inner };
+  std::array<double, 6> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
   const double u = std::max(largest(after.u), largest(before.u)), w = largest(after.w),
                w_both = std::max(w, largest(before.w)), theta = largest(in.coupling_theta);
@@ -327,7 +330,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         if (!left.allFinite()) raise(backward, std::numeric_limits<double>::infinity());
       }
       work += magnitude.dot(Point<d>(in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()));
-      raise(applied, Point<d>(moved + given + expansion.cwiseAbs()).maxCoeff());
+      raise(applied, Point<d>(given + expansion.cwiseAbs()).maxCoeff());
+      raise(strained, std::max(elastic.cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff()));
       raise(inner, Point<d>(u * at(elastic_rows_) + w * at(viscous_rows_)).maxCoeff());
       raise(acting, std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(),
                               at(*e0).cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff(),
@@ -344,7 +348,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
   l.force_defect = relative(most[defect], most[acting]);
   // where no force is applied, inner forces of a size that rounding of u makes are none
-  l.force_scale = most[applied] > 0 ? most[acting] : std::max(most[acting], 1e-11 * most[inner]);
+  l.force_scale =
+      most[applied] > 0 ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.
