@@ -269,6 +269,12 @@ StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
   }
 }
 
+// Whether the squares of numbers are numbers, on all ranks.
+template <int d>
+bool Stepper<d>::in_range(const Eigen::VectorXd& values) const {
+  return layout_.sum(std::isfinite(values.squaredNorm()) ? 0.0 : 1.0) == 0;
+}
+
 template <int d>
 StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   if (loads.gap.size() != surface_.points()) throw std::invalid_argument("the gap needs one value a contact point");
@@ -281,7 +287,7 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   errors_ = {};
   ContactSolution<d> contact;
   if (momentum_ && !solve_motion(loads, contact)) {
-    const bool finite = layout_.sum(free_.allFinite() ? 0.0 : 1.0) == 0;
+    const bool finite = in_range(free_);
     StepReport<d> report =
         !finite               ? not_taken<d>(Outcome::not_finite, beyond_doubles)
         : contact.unsupported ? not_taken<d>(Outcome::unsupported, unsupported)

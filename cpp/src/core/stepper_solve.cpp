@@ -121,9 +121,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     }
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
   }
-  if (contact_ && (layout_.sum(free_.allFinite() ? 0.0 : 1.0) > 0 ||
-                   !solve_contact(loads, free_, contact_force_, contact)))
-    return false;
+  if (contact_ && (!in_range(free_) || !solve_contact(loads, free_, contact_force_, contact))) return false;
   const Timed part(cost_.momentum_seconds);
   expand(contact, monolithic() ? coupled_ : next_.w, strained_w_);
   if (monolithic()) split(coupled_, next_.w, next_.theta);
