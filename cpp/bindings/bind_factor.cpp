@@ -10,6 +10,7 @@ void bind_factor(py::module_& m) {
       .value("petsc", Backend::petsc);
   py::enum_<Symmetry>(m, "Symmetry")
       .value("positive_definite", Symmetry::positive_definite)
+      .value("definite_or_refused", Symmetry::definite_or_refused)
       .value("symmetric", Symmetry::symmetric)
       .value("general", Symmetry::general);
   py::class_<Factor>(m, "Factor", "A factored operator with some unknowns held apart (collective).")

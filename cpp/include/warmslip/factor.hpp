@@ -9,7 +9,8 @@
 namespace warmslip {
 
 enum class Backend { automatic, cholmod, petsc };
-enum class Symmetry { positive_definite, symmetric, general };
+/// `definite_or_refused`: positive definite unless the data make it indefinite, which is refused.
+enum class Symmetry { positive_definite, definite_or_refused, symmetric, general };
 
 /// K with the unknowns `trailing` (E selects them): x = K^-1 (r - E load) in two halves around the contact problem.
 class Factor {
@@ -37,7 +38,8 @@ class Factor {
 /// Factors `k`. `trailing` are global scalar indices, the same on every rank. On one rank CHOLMOD is used when it is
 /// there and the matrix is symmetric, with the trailing unknowns ordered last, so that a step costs exactly one forward
 /// and one backward substitution and C comes free with the last block; otherwise PETSc's KSP under `prefix` (default
-/// MUMPS). `block` is the number of unknowns a node.
+/// MUMPS). `block` is the number of unknowns a node. Throws std::invalid_argument when the operator is singular, or
+/// indefinite where that is refused.
 std::unique_ptr<Factor> factor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block,
                                const std::string& prefix, Backend backend = Backend::automatic);
 

@@ -16,7 +16,8 @@ std::unique_ptr<Factor> factor(Mat k, const std::vector<PetscInt>& trailing, Sym
         "the CHOLMOD backend needs one rank and a symmetric operator; use backend 'petsc' or 'automatic'");
   if (possible && backend != Backend::petsc) {
     if (auto sequential = factor_with_cholmod(k, trailing, symmetry, block)) return sequential;
-    symmetry = Symmetry::symmetric;  // it was not definite after all
+    // perhaps not definite after all; MUMPS counts its negative pivots
+    if (symmetry == Symmetry::positive_definite) symmetry = Symmetry::symmetric;
     if (backend == Backend::cholmod)
       throw std::runtime_error("CHOLMOD is not in this build or could not factor the " + prefix + " operator");
   }

@@ -74,7 +74,7 @@ class CholmodFactor final : public Factor {
     common_.postorder = 0;  // it would move the trailing unknowns
     // A symmetric matrix that may be indefinite (quasi-definite) needs L D L^T from the start; a definite one is
     // factored quicker in dense blocks as L L^T and then brought to the same form.
-    const bool definite = symmetry == Symmetry::positive_definite;
+    const bool definite = symmetry == Symmetry::positive_definite || symmetry == Symmetry::definite_or_refused;
     common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     for (int i = 0; i < 3; ++i) common_.nrelax[i] = 0, common_.zrelax[i] = 0;  // every stored zero would be substituted
     factor_ = cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_);

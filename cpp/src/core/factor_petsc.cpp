@@ -8,13 +8,14 @@ class PetscFactor final : public Factor {
   PetscFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix)
       : prefix_(prefix) {
     const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(k));
-    const bool cholesky = symmetry == Symmetry::positive_definite;
+    const bool counted = symmetry == Symmetry::definite_or_refused,
+               cholesky = counted || symmetry == Symmetry::positive_definite;
     WARMSLIP_PETSC(KSPCreate(comm, ksp_.out()));
     WARMSLIP_PETSC(KSPSetOptionsPrefix(ksp_, (prefix + "_").c_str()));
     WARMSLIP_PETSC(KSPSetOperators(ksp_, k, k));
     WARMSLIP_PETSC(KSPSetType(ksp_, KSPPREONLY));
     WARMSLIP_PETSC(MatSetOption(k, MAT_SYMMETRIC, symmetry == Symmetry::general ? PETSC_FALSE : PETSC_TRUE));
-    if (cholesky) WARMSLIP_PETSC(MatSetOption(k, MAT_SPD, PETSC_TRUE));
+    if (cholesky && !counted) WARMSLIP_PETSC(MatSetOption(k, MAT_SPD, PETSC_TRUE));
     PC pc;
     WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
     WARMSLIP_PETSC(PCSetType(pc, cholesky ? PCCHOLESKY : PCLU));
@@ -25,6 +26,11 @@ class PetscFactor final : public Factor {
       throw std::invalid_argument("the " + prefix +
                                   " operator could not be factored: it is singular or its entries "
                                   "are out of range; check the material, the supports and the time step");
+    if (counted && negative_pivots() > 0)
+      throw std::invalid_argument(
+          "time.coupling: the " + prefix +
+          " operator is indefinite: a coupling R = +M of this size feeds in more energy than a step of inertia, viscosity "
+          "and elasticity holds; give heat.heating the sign of -M, a smaller tensor, viscosity, or coupling = \"staggered\"");
     WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
     work_ = duplicate(right_);
 
@@ -98,6 +104,21 @@ class PetscFactor final : public Factor {
     if (reason() < 0)
       throw SolveFailed("the " + prefix_ + " solver ended with " + KSPConvergedReasons[reason()] +
                         "; change the PETSc options that start with " + prefix_ + "_");
+  }
+
+  // counted by MUMPS; none where another solver was chosen
+  PetscInt negative_pivots() const {
+    PC pc;
+    Mat factored;
+    MatSolverType package = nullptr;
+    WARMSLIP_PETSC(KSPGetPC(ksp_, &pc));
+    if (!direct()) return 0;
+    WARMSLIP_PETSC(PCFactorGetMatSolverType(pc, &package));
+    if (!package || std::string(package) != MATSOLVERMUMPS) return 0;
+    WARMSLIP_PETSC(PCFactorGetMatrix(pc, &factored));
+    PetscInt count = 0;
+    WARMSLIP_PETSC(MatMumpsGetInfog(factored, 12, &count));
+    return count;
   }
 
   // a direct solver, unless the options say otherwise

@@ -184,7 +184,7 @@ std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem) {
   }
   if (!any) return {1, problem.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general};
   if (c == 0 || !problem.conducts_symmetrically()) return {1, Symmetry::general};
-  return {1 / c, c > 0 ? Symmetry::positive_definite : Symmetry::symmetric};
+  return {1 / c, c > 0 ? Symmetry::definite_or_refused : Symmetry::symmetric};
 }
 
 #define WARMSLIP_INSTANTIATE(d)                                                                                   \
