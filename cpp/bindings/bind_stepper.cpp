@@ -155,8 +155,8 @@ void bind_stepper(py::module_& m) {
   term("force_scale", &Ledger::force_scale);
   ledger.attr("terms") = py::tuple(terms);
 
-  auto errors = py::class_<Errors>(m, "Errors",
-                                   "Estimated relative errors of the fields of one step; nan is absent or not measured.");
+  auto errors = py::class_<Errors>(
+      m, "Errors", "Estimated relative errors of the fields of one step; nan is absent or not measured.");
   py::list fields;
   const auto field = [&](const char* attribute, double Errors::*member) {
     errors.def_readonly(attribute, member);

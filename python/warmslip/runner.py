@@ -134,7 +134,9 @@ class Run:
             if report.outcome != _core.Outcome.right:
                 wrong = self._wrong_law()
                 self.outcome = "law_failed" if wrong else report.outcome.name
-                known = {name: value for name, value in residuals(report).items() if value == value}  # nan: not computed
+                known = {
+                    name: value for name, value in residuals(report).items() if value == value
+                }  # nan: not computed
                 self.failure = {"step": n, "reason": wrong or report.reason} | known
                 if errors := estimates(report):
                     self.failure["digits"] = summary.digits(errors)
@@ -184,8 +186,8 @@ def run(
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
     right, contact_not_converged, not_finite, data_not_finite (a load, a gap), law_failed (a law of one's own), identity_violated,
-    precision_lost, unsupported, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after Ctrl-C or
-    SIGTERM, which leave a checkpoint.
+    precision_lost, unsupported, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after
+    Ctrl-C or SIGTERM, which leave a checkpoint.
     Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
     cannot be written.
     """

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 def digits(errors: dict[str, float]) -> dict[str, float]:
     """Decimal digits that estimated relative errors leave to be trusted, 16 at most, by field."""
-    return {name: round(min(16.0, max(0.0, -math.log10(value))), 1) if value > 0 else 16.0 for name, value in errors.items()}
+    return {
+        name: round(min(16.0, max(0.0, -math.log10(value))), 1) if value > 0 else 16.0 for name, value in errors.items()
+    }
 
 
 def summary(job: Run) -> dict[str, Any]:

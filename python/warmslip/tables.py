@@ -370,7 +370,9 @@ class ContactTable(Table):
     @model_validator(mode="after")
     def _bends(self) -> Self:
         if self.rigid and (self.exponent != 1 or self.pressure_limit is not None):
-            raise ValueError("a rigid foundation has no exponent and no pressure_limit; remove them, or give a stiffness")
+            raise ValueError(
+                "a rigid foundation has no exponent and no pressure_limit; remove them, or give a stiffness"
+            )
         return self
 
     @property

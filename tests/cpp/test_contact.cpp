@@ -131,8 +131,7 @@ TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite differenc
       for (int a = 0; a < d; ++a) {
         const Point<d> e = step * Point<d>::Unit(a);
         const auto f1 = at(f + e, w), f0 = at(f - e, w), w1 = at(f, w + e), w0 = at(f, w - e);
-        for (const auto* side : {&f1, &f0, &w1, &w0})
-          kink = kink || side->key() / 10 != here.key() / 10;
+        for (const auto* side : {&f1, &f0, &w1, &w0}) kink = kink || side->key() / 10 != here.key() / 10;
         by_force.col(a) = (f1.value - f0.value) / (2 * step);
         by_velocity.col(a) = (w1.value - w0.value) / (2 * step);
       }

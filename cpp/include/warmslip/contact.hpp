@@ -109,14 +109,14 @@ struct OwnCompliance {
   double tangential;  ///< velocity per tangential force
 };
 
-/// Residual and generalised derivative of the law at one point, written so that zero is the law itself (Alart & Curnier,
-/// Comput. Methods Appl. Mech. Eng. 92, 1991): with force lambda and velocity w,
+/// Residual and generalised derivative of the law at one point, written so that zero is the law itself (Alart &
+/// Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991): with force lambda and velocity w,
 ///   normal      see NormalResidual
 ///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + w_tau / own),   T = weight times the friction bound
 /// The bound reads the pressure from the unknown force, max(lambda_nu, 0) / weight, and not from the penetration: an
 /// iterate whose penetration no force has stopped yet would have far too large a bound. A bound that depends on the
-/// speed is taken at the speed s with T(s) + s / own = |lambda_tau + w_tau / own|, its resolvent. Regularised friction has
-/// lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
+/// speed is taken at the speed s with T(s) + s / own = |lambda_tau + w_tau / own|, its resolvent. Regularised friction
+/// has lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
 template <int d>
 struct PointResidual {
   Point<d> value;

@@ -30,12 +30,12 @@ struct Ledger {
   /// the same balance for theta; `held`: of parts held at a temperature
   double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, held;
   /// Backward errors: what a balance leaves over, against the sum of the magnitudes of what was added in it, with
-  /// |A| |u| for the products in it. A step that is solved to round-off has round-off here, however small its forces are.
-  /// The force residual is the largest over the equations of all nodes (Oettli & Prager, Numer. Math. 6, 1964) and over
-  /// force and moment; where the body has no support, inner forces have no part in the magnitudes of the latter.
+  /// |A| |u| for the products in it. A step that is solved to round-off has round-off here, however small its forces
+  /// are. The force residual is the largest over the equations of all nodes (Oettli & Prager, Numer. Math. 6, 1964) and
+  /// over force and moment; where the body has no support, inner forces have no part in the magnitudes of the latter.
   double energy_residual, heat_residual, force_residual, law_residual;
-  /// What the equations of the nodes leave over against the largest force (flow of heat) that acts in them: says whether
-  /// the answer may be wrong, which an ill-conditioned operator makes possible in spite of round-off residuals.
+  /// What the equations of the nodes leave over against the largest force (flow of heat) that acts in them: says
+  /// whether the answer may be wrong, which an ill-conditioned operator makes possible in spite of round-off residuals.
   double force_defect, heat_defect;
   double force_scale;  ///< the largest force at a node beside its inertia: what errors of forces are compared with
 };
@@ -59,8 +59,8 @@ class Bookkeeper {
   /// Closes the books of the step from `before` to `after` (collective).
   Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
 
-  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`, where
-  /// given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
+  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`,
+  /// where given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
   void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
                        Vec external = nullptr) const;
   void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
@@ -82,7 +82,8 @@ class Bookkeeper {
   const ContactSurface<d>& surface_;
   VecHandle viscous_w_, contact_force_;             // B w, E lambda
   VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
-  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // hat functions at the contact points, found anew from positions
+  Eigen::SparseMatrix<double, Eigen::RowMajor>
+      shape_;                  // hat functions at the contact points, found anew from positions
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;

@@ -45,12 +45,13 @@ class RigidMotions {
   Eigen::VectorXd load(Vec external, Vec all) const;
   /// The motions a without contact. Throws SolveFailed when there is no mass to hold them.
   Eigen::VectorXd alone(const Eigen::VectorXd& load) const;
-  /// inner -= V a, then x = inner + Z a: with inner = K~^-1 (b - E lambda) the solution, and the part of it that strains.
+  /// inner -= V a, then x = inner + Z a: with inner = K~^-1 (b - E lambda) the solution, and the part of it that
+  /// strains.
   void add(const Eigen::VectorXd& motions, Vec inner, Vec x) const;
   /// x -= the motion that is nearest to it, in the sum of squares over the nodes.
   void remove(Vec x) const;
 
-  const Eigen::MatrixXd& inertia() const { return inertia_; }  ///< H
+  const Eigen::MatrixXd& inertia() const { return inertia_; }                      ///< H
   Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }  ///< a column of W
 
  private:

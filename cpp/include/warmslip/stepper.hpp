@@ -28,8 +28,8 @@ struct StepperOptions {
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
-  double refinement = 5e-12;     ///< equations that leave more get iterative refinement, see Ledger::force_defect
-  int passes = 6;                ///< of it at most, while they help
+  double refinement = 5e-12;      ///< equations that leave more get iterative refinement, see Ledger::force_defect
+  int passes = 6;                 ///< of it at most, while they help
   double identity_bound = 1e-10;  ///< a step whose balances leave more is not right, see Ledger::energy_residual
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
   int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on

@@ -27,10 +27,11 @@ class PetscFactor final : public Factor {
                                   " operator could not be factored: it is singular or its entries "
                                   "are out of range; check the material, the supports and the time step");
     if (counted && negative_pivots() > 0)
-      throw std::invalid_argument(
-          "time.coupling: the " + prefix +
-          " operator is indefinite: a coupling R = +M of this size feeds in more energy than a step of inertia, viscosity "
-          "and elasticity holds; give heat.heating the sign of -M, a smaller tensor, viscosity, or coupling = \"staggered\"");
+      throw std::invalid_argument("time.coupling: the " + prefix +
+                                  " operator is indefinite: a coupling R = +M of this size feeds in more energy than a "
+                                  "step of inertia, viscosity "
+                                  "and elasticity holds; give heat.heating the sign of -M, a smaller tensor, "
+                                  "viscosity, or coupling = \"staggered\"");
     WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
     work_ = duplicate(right_);
 

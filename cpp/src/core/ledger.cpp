@@ -131,9 +131,10 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   interpolate_anew();
 }
 
-// The hat functions of the contact nodes at the contact points, from where the points are: the facet of the point's part
-// with its normal that it lies on, and its barycentric coordinates there. Nothing of the solver's own matrix is used, so
-// that a fault in it shows. Points come in the order of the facets, hence the search goes on from the last one.
+// The hat functions of the contact nodes at the contact points, from where the points are: the facet of the point's
+// part with its normal that it lies on, and its barycentric coordinates there. Nothing of the solver's own matrix is
+// used, so that a fault in it shows. Points come in the order of the facets, hence the search goes on from the last
+// one.
 template <int d>
 void Bookkeeper<d>::interpolate_anew() {
   const Mesh<d>& mesh = layout_.mesh();
@@ -155,12 +156,12 @@ void Bookkeeper<d>::interpolate_anew() {
       Eigen::Matrix<double, d, d - 1> sides;
       for (int i = 1; i < d; ++i) sides.col(i - 1) = corners.col(i) - corners.col(0);
       const Eigen::Matrix<double, d - 1, 1> b = sides.colPivHouseholderQr().solve(x - corners.col(0));
-      if (b.minCoeff() < -1e-9 || b.sum() > 1 + 1e-9 ||
-          (sides * b - (x - corners.col(0))).norm() > 1e-9 * sides.norm())
+      if (b.minCoeff() < -1e-9 || b.sum() > 1 + 1e-9 || (sides * b - (x - corners.col(0))).norm() > 1e-9 * sides.norm())
         continue;
       found = true;
       entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, 0)), 1 - b.sum());
-      for (int i = 1; i < d; ++i) entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, i)), b[i - 1]);
+      for (int i = 1; i < d; ++i)
+        entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, i)), b[i - 1]);
       --facet;
     }
     if (!found) throw std::logic_error("a contact point lies on no facet of its part");
@@ -203,13 +204,12 @@ Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepI
   return ledger;
 }
 
-// The contact terms: stored energy and friction from the forces, as a stiff law leaves no digits to its penetrations; that
-// forces and penetrations obey the law is a balance of its own.
+// The contact terms: stored energy and friction from the forces, as a stiff law leaves no digits to its penetrations;
+// that forces and penetrations obey the law is a balance of its own.
 template <int d>
 void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
-  const ContactProblem<d> problem =
-      contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
+  const ContactProblem<d> problem = contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
   double stored_before = 0;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
@@ -284,10 +284,10 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   const double sum = l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
                      l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work -
                      l.support_work;
-  l.energy_residual = relative(
-      sum, largest_of({l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before, l.viscous,
-                       l.friction, l.load_work, l.expansion_work, l.gap_work, l.support_work}) +
-               work_magnitude_);
+  l.energy_residual =
+      relative(sum, largest_of({l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before,
+                                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work, l.support_work}) +
+                        work_magnitude_);
 }
 
 // The equation of motion at every free node, force and moment: the supports' reactions are the residuals of the fixed
@@ -333,9 +333,9 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       raise(applied, Point<d>(given + expansion.cwiseAbs()).maxCoeff());
       raise(strained, std::max(elastic.cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff()));
       raise(inner, Point<d>(u * at(elastic_rows_) + w * at(viscous_rows_)).maxCoeff());
-      raise(acting, std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(),
-                              at(*e0).cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff(),
-                              expansion.cwiseAbs().maxCoeff()}));
+      raise(acting,
+            std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(), at(*e0).cwiseAbs().maxCoeff(),
+                      viscous.cwiseAbs().maxCoeff(), expansion.cwiseAbs().maxCoeff()}));
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
@@ -394,8 +394,8 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   l.exchanged += in.k * dot(after.theta, exchanged_);
   l.supplied = in.k * dot(in.heat, after.theta);
   l.heating = in.k * dot(in.heating_w, after.theta);
-  const double sum = l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating -
-                     l.friction_heating - l.held;
+  const double sum =
+      l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating - l.friction_heating - l.held;
   most = over_ranks(layout_.comm(), most);
   l.heat_residual = std::max({most[backward], relative(layout_.sum(content), layout_.sum(content_size)),
                               relative(sum, largest_of({stored, stored_before, l.heat_damping, l.conducted, l.exchanged,

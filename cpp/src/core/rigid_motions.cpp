@@ -65,7 +65,8 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector
   mark(avoid, avoided, false);
   std::vector<std::vector<Index>> parts(root.size());
   for (std::size_t i = 0; i < root.size(); ++i)
-    if (!held[static_cast<std::size_t>(root[i])]) parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
+    if (!held[static_cast<std::size_t>(root[i])])
+      parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
   std::vector<Eigen::VectorXd> rows;  // Z at the springs
   for (const auto& nodes : parts) {
     if (nodes.size() < 2) continue;  // a node of no cell
@@ -74,11 +75,13 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector
     for (Eigen::Index j = 0; j < several; ++j) {
       Eigen::VectorXd values = Eigen::VectorXd::Zero(mesh.nodes.rows() * block);
       for (std::size_t i = 0; i < nodes.size(); ++i)
-        values.segment(Eigen::Index{nodes[i]} * block, block) = z.col(j).segment(static_cast<Eigen::Index>(i) * block, block);
+        values.segment(Eigen::Index{nodes[i]} * block, block) =
+            z.col(j).segment(static_cast<Eigen::Index>(i) * block, block);
       motions_.push_back(layout.vector(block));
       layout.distribute(values, motions_.back());
     }
-    // springs where they hold the motions best: rows of Z by pivoting, on the nodes that are not avoided if they suffice
+    // springs where they hold the motions best: rows of Z by pivoting, on the nodes that are not avoided if they
+    // suffice
     Eigen::MatrixXd candidates = z;
     for (std::size_t i = 0; i < nodes.size(); ++i)
       if (avoided[static_cast<std::size_t>(nodes[i])])
@@ -96,7 +99,8 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector
     }
   }
   at_springs_ = Eigen::MatrixXd::Zero(count(), count());
-  for (std::size_t i = 0; i < rows.size(); ++i) at_springs_.row(static_cast<Eigen::Index>(i)).head(rows[i].size()) = rows[i];
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    at_springs_.row(static_cast<Eigen::Index>(i)).head(rows[i].size()) = rows[i];
   gram_.resize(count(), count());
   for (Eigen::Index j = 0; j < count(); ++j) gram_.col(j) = dots(motions_, motions_[static_cast<std::size_t>(j)]);
 }
@@ -187,7 +191,9 @@ void RigidMotions::remove(Vec x) const {
   if (!empty()) combine(motions_, -gram_.ldlt().solve(dots(motions_, x)), x);
 }
 
-template RigidMotions::RigidMotions(const Layout<2>&, int, const std::vector<std::string>&, const std::vector<std::string>&);
-template RigidMotions::RigidMotions(const Layout<3>&, int, const std::vector<std::string>&, const std::vector<std::string>&);
+template RigidMotions::RigidMotions(const Layout<2>&, int, const std::vector<std::string>&,
+                                    const std::vector<std::string>&);
+template RigidMotions::RigidMotions(const Layout<3>&, int, const std::vector<std::string>&,
+                                    const std::vector<std::string>&);
 
 }  // namespace warmslip

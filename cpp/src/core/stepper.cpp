@@ -20,8 +20,8 @@ StepReport<d> not_taken(Outcome outcome, const std::string& reason) {
   report.outcome = outcome;
   report.reason = reason;
   Ledger& l = report.ledger;
-  for (double* unknown : {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.force_defect,
-                          &l.heat_defect})
+  for (double* unknown :
+       {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.force_defect, &l.heat_defect})
     *unknown = std::numeric_limits<double>::quiet_NaN();
   return report;
 }
@@ -117,8 +117,7 @@ void Stepper<d>::note(double& error, double& scale, double change, double size) 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
 // solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
 template <int d>
-bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact,
-                                bool apply) {
+bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply) {
   const bool monolithic = this->monolithic();
   const StepInputs inputs = this->inputs(loads, contact);
   books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
@@ -226,8 +225,8 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.viscous + l.load_work + l.conducted + l.heat_change))
     return Outcome::not_finite;
   const double bound = options_.identity_bound;
-  const bool closed = l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound &&
-                      l.law_residual <= bound;
+  const bool closed =
+      l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
   if (!closed) return Outcome::identity_violated;
   return errors_.largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
 }
@@ -242,12 +241,13 @@ std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
     case Outcome::not_finite:
       return beyond_doubles;
     case Outcome::precision_lost:
-      for (const auto& [name, error] : {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta},
-                                        std::pair{"the elastic forces", errors_.stress},
-                                        std::pair{"the contact force", errors_.contact_force}})
+      for (const auto& [name, error] :
+           {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta},
+            std::pair{"the elastic forces", errors_.stress}, std::pair{"the contact force", errors_.contact_force}})
         if (error > options_.error_bound) list(name);
       return "fewer than four digits of " + names +
-             " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for double "
+             " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for "
+             "double "
              "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other";
     case Outcome::identity_violated: {
       for (const auto& [name, residual] : {std::pair{"energy", l.energy_residual}, std::pair{"heat", l.heat_residual},
@@ -288,11 +288,11 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   ContactSolution<d> contact;
   if (momentum_ && !solve_motion(loads, contact)) {
     const bool finite = in_range(free_);
-    StepReport<d> report =
-        !finite               ? not_taken<d>(Outcome::not_finite, beyond_doubles)
-        : contact.unsupported ? not_taken<d>(Outcome::unsupported, unsupported)
-                              : not_taken<d>(Outcome::contact_not_converged,
-                                             "no stage of the contact solver reached the law; take smaller steps");
+    StepReport<d> report = !finite ? not_taken<d>(Outcome::not_finite, beyond_doubles)
+                           : contact.unsupported
+                               ? not_taken<d>(Outcome::unsupported, unsupported)
+                               : not_taken<d>(Outcome::contact_not_converged,
+                                              "no stage of the contact solver reached the law; take smaller steps");
     report.stage = contact.stage;
     report.newton_iterations = contact.iterations;
     if (finite) report.ledger.law_residual = contact.law_residual;

@@ -46,8 +46,7 @@ void Stepper<d>::take_factors() {
     }
     if (moves) {
       const MatHandle a = momentum_matrix(layout_, problem_, operators_, k);
-      if (operators_.elasticity || operators_.viscosity)
-        rigid_ = RigidMotions(layout_, d, problem_.clamped, touching);
+      if (operators_.elasticity || operators_.viscosity) rigid_ = RigidMotions(layout_, d, problem_.clamped, touching);
       if (!rigid_.empty()) rigid_.add_springs(a);
       momentum_ = factor(a, surface_.unknowns(d), Symmetry::positive_definite, d, "momentum", options_.backend);
       if (!rigid_.empty())

@@ -70,8 +70,8 @@ void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double s
   fix(out, operators_.cooled, loads.support_temperature, 1 / scale);
 }
 
-// The free velocities of the contact points for a right-hand side, which is remembered with the load on the motions that
-// are solved for apart; `external` is the part of it that acts on those.
+// The free velocities of the contact points for a right-hand side, which is remembered with the load on the motions
+// that are solved for apart; `external` is the part of it that acts on those.
 template <int d>
 Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   const Eigen::VectorXd nodal = momentum_->reduce(right);
@@ -79,8 +79,8 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
-// The solution for the right-hand side of the last `reduce` and the forces of the contact; `strained` receives it but for a
-// rigid motion, where such are solved for apart.
+// The solution for the right-hand side of the last `reduce` and the forces of the contact; `strained` receives it but
+// for a rigid motion, where such are solved for apart.
 template <int d>
 void Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, Vec strained) {
   const bool apart = !rigid_.empty();

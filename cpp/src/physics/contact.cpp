@@ -67,8 +67,9 @@ NormalResidual normal_residual(const NormalCompliance& law, double weight, doubl
   if (!(y > 0)) return {force, 1, 0, false};
   if (law.linear()) {
     const double stiff = weight * law.stiffness * give;  // of the foundation over the body
-    if (stiff < 1) return {(force - weight * law.stiffness * r) / (1 + stiff), 1 / (1 + stiff),
-                           -weight * law.stiffness / (1 + stiff), true};
+    if (stiff < 1)
+      return {(force - weight * law.stiffness * r) / (1 + stiff), 1 / (1 + stiff),
+              -weight * law.stiffness / (1 + stiff), true};
     const double soft = 1 / stiff;
     return {(soft * force - r / give) / (1 + soft), soft / (1 + soft), -1 / (give * (1 + soft)), true};
   }
@@ -180,9 +181,9 @@ double friction_power(const Friction& friction, double bound, double slip_speed)
   return bound * slip_speed;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                            \
-  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double,                 \
-                                        const OwnCompliance&, const Point<d>&, const Point<d>&);           \
+#define WARMSLIP_INSTANTIATE(d)                                                                                  \
+  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, const OwnCompliance&, \
+                                        const Point<d>&, const Point<d>&);                                       \
   template FrictionDefect friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -47,8 +47,8 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
     fastest = std::max({fastest, free.norm(), w.norm()});
     largest = std::max(largest, f.norm());
-    widest = std::max(
-        widest, point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
+    widest = std::max(widest,
+                      point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
   }
   if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(fastest))
     return std::numeric_limits<double>::infinity();
@@ -101,8 +101,8 @@ OwnCompliance ContactSolver<d>::own(const ContactProblem<d>& problem, std::size_
   const Tensor2<d> across = tangential * block * tangential;
   // of the at most two eigenvalues that are not zero the larger one
   const double half = across.trace() / 2,
-               largest = d == 2 ? across.trace()
-                                : half + std::sqrt(std::max(0.0, across.squaredNorm() / 2 - half * half));
+               largest =
+                   d == 2 ? across.trace() : half + std::sqrt(std::max(0.0, across.squaredNorm() / 2 - half * half));
   return {problem.step * nu.dot(block * nu), largest / boldness_};
 }
 
@@ -236,7 +236,8 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     solution.velocity = at.velocity;
     // the motions that are solved for apart are linear and exact after a full step
     const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
-    const double forces = rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
+    const double forces =
+        rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
     if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);

@@ -48,9 +48,7 @@ def _pressed(stiffness: float) -> list[Line]:
     moved = -np.asarray(job.stepper.contact_displacement).reshape(-1, 2)[:, 1]
     return [
         near(name, "the force is exact", "analytic", exact, forces[0], bench.ROUND_OFF),
-        below(
-            name, "u_nu is g + p/c_nu", "analytic", bench.worst(moved, GAP + p / stiffness, HEIGHT), bench.ROUND_OFF
-        ),
+        below(name, "u_nu is g + p/c_nu", "analytic", bench.worst(moved, GAP + p / stiffness, HEIGHT), bench.ROUND_OFF),
     ]
 
 
