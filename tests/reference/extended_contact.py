@@ -7,8 +7,8 @@ and omega the weights, the law is
 
 T = omega times the friction bound. Newton starts where it is told, or at the last step's forces. If it fails, the pull of the
 body off the foundation is reduced to nothing along a path: at its beginning only the open state obeys the law, and the path of
-solutions (a broken line, for d = 2 and piecewise linear laws) leads to the end, as in Lemke's method. Laws that bend are replaced by
-their tangents on the way (`Bent`). Whatever the way, `Contact.defect` judges what comes out.
+solutions (a broken line, for d = 2 and piecewise linear laws) leads to the end, as in Lemke's method. Laws that bend are
+replaced by their tangents on the way. Whatever the way, `Contact.defect` judges what comes out.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from reference.extended_numbers import ONE, ZERO, Big, above, big, eye, largest,
 CLOSE = big(1e-40)  # of a residual, relative
 # of the points' compliance: sticking points creep by it, which fixes how they share a force (least sum of squares over weights)
 CREEP = big(1e-40)
+NOTHING = big(1e-30)  # forces that are none, over those that would stop the body
 LAW = 1e-25  # defect of a solution that counts as one
 
 
@@ -151,10 +152,10 @@ class Contact:
             speed = norm(v[q, t])
             value, by_p, by_speed = law.bound(lam[q, 0] / omega if pressing else ZERO, speed)
             T = omega * value
-            I = eye(d - 1)
+            one = eye(d - 1)
             if not above(T):
                 F[q, t] = lam[q, t]
-                by_force[q, t, t] = I
+                by_force[q, t, t] = one
                 continue
             wider_force = by_p if pressing else ZERO
             moving = v[q, t] / speed if above(speed) else zeros(d - 1)
@@ -163,21 +164,21 @@ class Contact:
                 blunt = (speed * speed + law.smear * law.smear).sqrt()
                 along = v[q, t] / blunt
                 F[q, t] = lam[q, t] - T * along
-                by_force[q, t, t] = I
+                by_force[q, t, t] = one
                 by_force[q, t, 0] = -along * wider_force
-                by_velocity[q, t, t] = -T / blunt * (I - np.outer(along, along)) - np.outer(along, wider_velocity)
+                by_velocity[q, t, t] = -T / blunt * (one - np.outer(along, along)) - np.outer(along, wider_velocity)
                 continue
             beta = self.beta[q]
             trial = lam[q, t] + beta * v[q, t]
             size = norm(trial)
             if not above(size, T):
                 F[q, t] = -beta * v[q, t]
-                by_velocity[q, t, t] = -beta * I
+                by_velocity[q, t, t] = -beta * one
                 continue
             along = trial / size
-            turn = T / size * (I - np.outer(along, along)) if d == 3 else zeros(1, 1)
+            turn = T / size * (one - np.outer(along, along)) if d == 3 else zeros(1, 1)
             F[q, t] = lam[q, t] - T * along
-            by_force[q, t, t] = I - turn
+            by_force[q, t, t] = one - turn
             by_force[q, t, 0] = -along * wider_force
             by_velocity[q, t, t] = -beta * turn - np.outer(along, wider_velocity)
         return mid(F), mid(by_force), mid(by_velocity)
@@ -222,16 +223,16 @@ class Contact:
 
     def defect(self, lam: Big, v: Big) -> float:
         """How far forces and velocities (without creep) are from the law, relative to the largest of each; 0 is the law."""
-        P, d = self.P, self.d
-        if not P:
+        if not self.P:
             return 0.0
         force = largest(lam)
         for q, law in enumerate(self.laws):
             if law.stiffness is not None:
                 force = max(force, abs(self.weights[q] * law.pressure(self.r0[q] + self.k * v[q, 0])[0]), key=float)
+        speed = max(largest(v), largest(times(self.compliance, lam.ravel())), key=float)
+        force = max(force, NOTHING * largest(self.beta) * speed, key=float)
         if not above(force):
             return 0.0
-        speed = max(largest(v), largest(self.z), key=float)
         depth = max(largest(self.r0), self.k * speed, key=float)
         worst = ZERO
         for q, law in enumerate(self.laws):

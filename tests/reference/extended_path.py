@@ -99,7 +99,7 @@ def path(contact: Contact, seed: int = 0) -> Big | None:
             here = (-a / b).mid()
             if above(t, here) == upwards:  # passed already, by rounding
                 here = t
-            if nearest is None and not upwards or above(where, here) == upwards:
+            if (nearest is None and not upwards) or above(where, here) == upwards:
                 nearest, where = key, here
         if nearest is None:
             return mid(at + slope).reshape(contact.P, 2) if upwards else None
