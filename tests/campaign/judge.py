@@ -44,7 +44,7 @@ class Ran:
     states: list[dict[str, Any]] = field(default_factory=list)
     positions: Any = None
     normals: Any = None
-    newton: int = 0
+    newton: list[int] = field(default_factory=list)  # iterations of each step
     digits: Any = ""
     seconds: float = 0.0
 
@@ -61,14 +61,15 @@ def run(scene: Scene) -> Ran:
     ran, surface = Ran(""), job.discretisation.surface
     ran.positions, ran.normals = np.array(surface.positions), np.array(surface.normals)
     try:
-        for state, _ in job.steps():
+        for state, report in job.steps():
+            ran.newton.append(int(report.newton_iterations))
             force = np.reshape(np.array(job.stepper.contact_force), (-1, scene.mesh.dim))
             fields = {"u": state.u, "w": state.w, "theta": state.theta, "stress": state.stress, "force": force}
             ran.states.append({name: None if x is None else np.array(x) for name, x in fields.items()})
     except RuntimeError as error:
         ran.outcome, ran.reason = "crash", str(error)
         return ran
-    ran.outcome, ran.newton = job.outcome, job.newton_max
+    ran.outcome = job.outcome
     if job.failure:
         ran.reason = f"step {job.failure['step']}: {job.failure['reason']}"
     ran.digits = job.summary().get("digits", "")
@@ -212,15 +213,21 @@ def nudged(scene: Scene, seed: int) -> Scene:
     return build(out)
 
 
+def row_of(ran: Ran, verdict: str) -> dict[str, Any]:
+    """What the run itself says, with room for the judgement."""
+    row: dict[str, Any] = {"class": verdict, "outcome": ran.outcome, "reason": ran.reason, "taken": len(ran.states)}
+    row |= {f"error_{name}": "" for name in FIELDS} | {f"spread_{name}": "" for name in FIELDS}
+    row |= {f"left_{name}": "" for name in LEFT} | {"way": "", "digits": ran.digits}
+    row |= {"newton_largest": max(ran.newton, default=0), "newton_mean": sum(ran.newton) / max(1, len(ran.newton))}
+    return row | {"run_seconds": ran.seconds, "judge_seconds": 0.0}
+
+
 def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
     """Class, errors of every field, how far the data move them, and what the run's own states leave over."""
     began = time.perf_counter()
-    row: dict[str, Any] = {"class": "", "outcome": ran.outcome, "reason": ran.reason, "taken": len(ran.states)}
-    row |= {f"error_{name}": "" for name in FIELDS} | {f"spread_{name}": "" for name in FIELDS}
-    row |= {f"left_{name}": "" for name in LEFT} | {"way": "", "newton": ran.newton, "digits": ran.digits}
-    row |= {"run_seconds": ran.seconds, "judge_seconds": 0.0}
-    if ran.outcome in ("refused", "crash", "hang"):
-        return row | {"class": ran.outcome}
+    row = row_of(ran, ran.outcome)
+    if ran.outcome in ("refused", "crash"):
+        return row
     it = Judge(scene)
     own, _ = it.own(ran)
     try:
