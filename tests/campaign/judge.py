@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from reference.extended_forms import isotropic
+from reference.extended_forms import VOIGT, isotropic
 from reference.extended_numbers import big, floats, mid, zeros
 from reference.extended_scheme import Scheme, State
 
@@ -145,6 +145,10 @@ class Judge:
                 out["theta"].append(s.theta)
         return out
 
+    def voigt(self, stress: Any) -> Any:
+        """A run's stress (cells, d, d) as the reference writes it, (cells, s)."""
+        return big(np.stack([stress[:, i, j] for i, j in VOIGT[self.scheme.d]], axis=1))
+
     def scales(self, fields: dict[str, list[Any]]) -> dict[str, float]:
         """The largest value of each field in the run; a velocity counts with the displacement, a stress with what the
         rounding of the displacements makes of it."""
@@ -235,6 +239,8 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
     except ArithmeticError as error:
         return row | {"class": "unjudged", "way": str(error), "judge_seconds": time.perf_counter() - began}
     mine, fields = it.fields(own), it.fields(reference)
+    if it.moves:
+        mine["stress"][1:] = [it.voigt(one["stress"]) for one in ran.states]
     scales = it.scales(fields)
     errors = it.apart(mine, fields, scales)
     clean = max(errors.values()) <= TOLERANCE

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing as mp
+import os
+import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-START = 60.0  # seconds a new process has before its first answer
+START = 60.0  # seconds a new process has to say that it is there
 
 
 def _serve(pipe: Connection, work: Callable[[Any, Callable[[Any], None]], Any]) -> None:
+    pipe.send(("ready", None))
     while (job := pipe.recv()) is not None:
         pipe.send(("done", work(job, lambda half: pipe.send(("half", half)))))
 
@@ -27,13 +30,13 @@ class _Worker:
         other.close()
         self.job: Any = None
         self.half: Any = None
-        self.until = 0.0
-        self.fresh = True
+        self.until = time.monotonic() + START
+        self.ready = False
 
     def give(self, job: Any, limit: float) -> None:
         self.job, self.half = job, None
-        self.until = time.monotonic() + limit + (START if self.fresh else 0)
-        self.fresh = False
+        if self.ready:
+            self.until = time.monotonic() + limit
         self.pipe.send(job)
 
     def end(self) -> None:
@@ -70,6 +73,9 @@ def served(
                         how, result = worker.pipe.recv()
                     except EOFError:
                         how, result = "crash", worker.half
+                if how == "ready":
+                    worker.ready, worker.until = True, time.monotonic() + limit
+                    continue
                 if how == "half":
                     worker.half = result
                     continue
@@ -84,3 +90,14 @@ def served(
     finally:
         for worker in workers:
             worker.end()
+
+
+def rehearse(job: str, tell: Callable[[Any], None]) -> str:
+    """Work that goes wrong when told to, for the tests: `die`, `sleep`, `half` and sleep; anything else comes back."""
+    if job == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if job == "half":
+        tell(job)
+    if job in ("die", "half", "sleep"):
+        time.sleep(100)
+    return job

@@ -12,12 +12,12 @@ and by the contact law: `Scheme.step` raises ArithmeticError rather than give wh
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from reference.extended_contact import Contact, Law, norm
+from reference.extended_contact import LAW, Contact, Law
 from reference.extended_forms import Forms, Mesh, contact_points, values
 from reference.extended_numbers import (
     ONE,
@@ -166,35 +166,34 @@ class Scheme:
             force = force + times(matrix(f.expansion), theta)
         return mid(force), mid(source + times(matrix(f.storage), theta) / self.k)
 
-    def step(self, old: State, n: int, guesses: list[Big] | None = None) -> State:
-        """The state after step n; `guesses` are contact forces (points, d) to start from."""
-        f, dN, d, P = self.forms, self.d * self.N, self.d, len(self.points)
+    def reduced(self, old: State, n: int) -> tuple[Contact, Big, Big]:
+        """The contact problem of step n, with the right-hand side of the free unknowns and what supports give."""
         force, source = self.right_side(old, n)
         w, theta = self.given(n)
-        lam, way = zeros(P, d), "none"
+        right = np.concatenate([force, source]) if self.monolithic else force
+        given = np.concatenate([w, theta]) if self.monolithic else w
+        right = mid(right - times(self.S, given))[self.free]
+        unloaded = given.copy()
+        unloaded[self.free] = times(self.inverse, right)
+        z = times(self.shape, unloaded[: self.d * self.N]).reshape(-1, self.d)
+        return self.contact(old, n, z), right, given
+
+    def step(self, old: State, n: int, guesses: list[Big] | None = None) -> State:
+        """The state after step n; `guesses` are contact forces (points, d) to start from."""
+        f, dN, d = self.forms, self.d * self.N, self.d
+        w, theta = self.given(n)
+        lam, way = zeros(len(self.points), d), "none"
         if f.moves:
-            right = np.concatenate([force, source]) if self.monolithic else force
-            given = np.concatenate([w, theta]) if self.monolithic else w
-            right = mid(right - times(self.S, given))[self.free]
-            unloaded = given.copy()
-            unloaded[self.free] = times(self.inverse, right)
-            z = times(self.shape, unloaded[:dN]).reshape(P, d)
-            contact = self.contact(old, n, z)
-            local = [self._local(g) for g in [*(guesses or []), old.force]]
-            lam, way = answer(contact, local)
-            pushed = times(self.shape_t, lam.ravel())
-            if self.monolithic:
-                pushed = np.concatenate([pushed, zeros(self.N)])
-            solution = given.copy()
+            contact, right, solution = self.reduced(old, n)
+            lam, way = answer(contact, [self._local(g) for g in [*(guesses or []), old.force]])
+            pushed = np.concatenate([times(self.shape_t, lam.ravel()), zeros(len(self.system) - dN)])
             solution[self.free] = times(self.inverse, mid(right - pushed[self.free]))
-            w = solution[:dN]
-            if self.monolithic:
-                theta = solution[dN:]
+            w, theta = solution[:dN], solution[dN:] if self.monolithic else theta
         new = State(mid(old.u + self.k * w.reshape(-1, d)), w.reshape(-1, d), theta, self._global(lam), way)
         if f.conducts and not self.monolithic:
-            new = State(new.u, new.w, self._temperature(old, new, n, source, theta), new.force, way)
+            new = replace(new, theta=self._temperature(old, new, n, theta))
         left = self.left_over(old, new, n)
-        if max(left["momentum"], left["heat"]) > SOLVED or left["law"] > 1e-20:
+        if max(left["momentum"], left["heat"]) > SOLVED or left["law"] > LAW:
             raise ArithmeticError(f"step {n} is not solved: {left}")
         return new
 
@@ -233,8 +232,9 @@ class Scheme:
             return source
         return source + times(matrix(self.forms.heating), (old if self.coupling == "lagged" else new).w.ravel())
 
-    def _temperature(self, old: State, new: State, n: int, source: Big, theta: Big) -> Big:
+    def _temperature(self, old: State, new: State, n: int, theta: Big) -> Big:
         led, made = self.contact_heat(new, n)
+        _, source = self.right_side(old, n)
         H, free = self.heat + led, self.free_theta
         right = mid(self._heat_right(old, new, source) + made - times(matrix(H), theta))
         out = theta.copy()
@@ -297,6 +297,3 @@ class Scheme:
         for n in range(1, self.scene.time.steps + 1):
             state = self.step(state, n)
             yield state
-
-
-__all__ = ["Scheme", "State", "norm"]
