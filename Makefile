@@ -37,7 +37,6 @@ mutants: setup  ## seeded faults against the tests: which check kills which (ARG
 
 extremes: setup  ## scenes all over the space of data, each judged in 80 digits (ARGS: --families, --count N, --jobs N, --scene laws:50)
 	@$(env) python tests/campaign/run.py $(ARGS)
-	@$(env) python -m warmslip draw campaign results/extremes/campaign.csv --out results/extremes/campaign.png
 
 docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)

@@ -4,7 +4,7 @@
     make extremes ARGS="--families supported free --count 64"
     make extremes ARGS="--scene laws:50"                 one scene: its file and what the judge says
 
-campaign.csv has a line a scene, campaign_summary.csv one a family, campaign.json the stamp; scenes that are not right go to
+campaign.csv has a line a scene, campaign_summary.csv one a family, campaign.png shows them; scenes that are not right go to
 a folder of scene files if one is named (`--keep`).
 """
 
@@ -120,12 +120,13 @@ def main(arguments: list[str] | None = None) -> int:
     table = summary(lines)
     write(given.out / "campaign.csv", lines)
     write(given.out / "campaign_summary.csv", table)
-    from warmslip import provenance
+    from warmslip import figures, provenance
 
     stamp = provenance.stamp(
         seed=sampling.SEED, scenes={f: sum(line["family"] == f for line in lines) for f in given.families}
     )
     (given.out / "campaign.json").write_text(json.dumps(stamp, indent=2) + "\n")
+    figures.draw("campaign", [given.out / "campaign.csv"], given.out / "campaign.png")
     for row in table:
         print(
             ", ".join(
