@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs
+.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs extremes
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -34,6 +34,9 @@ bench: setup  ## the benchmarks alone (ARGS go to pytest)
 
 mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --handful N, --every, --out FILE)
 	@$(env) python tests/mutants/run.py $(ARGS)
+
+extremes: setup  ## scenes all over the space of data, each judged in 80 digits (ARGS: --families, --count N, --jobs N, --scene laws:50)
+	@$(env) python tests/campaign/run.py $(ARGS)
 
 docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)

@@ -28,6 +28,8 @@ KINDS = {
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
     "table": ("maps", "the table of readings"),
     "extremes": ("maps", "the table of extremes"),
+    "campaign": ("campaign", "the table of the campaign, a line a scene"),
+    "envelope": ("campaign", "the table of the envelope"),
     "work": ("tradeoff", "the table of work"),
     "blocks": ("blocks", "the table of blocks"),
     "graded": ("verification", "graded_table.csv of the verification"),
