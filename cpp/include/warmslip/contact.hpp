@@ -138,14 +138,12 @@ template <int d>
 PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
                           const Point<d>& force, const Point<d>& velocity);
 
-/// How far (force, velocity) is from the friction law at one point whose bound is `bound` (force): the force beyond the
-/// bound and the power that is missing, or for regularised friction the distance in force.
-struct FrictionDefect {
-  double force, power;
-};
+/// How far a tangential force and a slip velocity are from the friction law at one point whose bound is `bound`
+/// (force): the least change of the force, over `forces`, or of the velocity, over `velocities`, after which the law
+/// holds.
 template <int d>
-FrictionDefect friction_defect(const Friction& friction, double bound, const Point<d>& force,
-                               const Point<d>& slip_velocity);
+double friction_defect(const Friction& friction, double bound, const Point<d>& force, const Point<d>& slip_velocity,
+                       double forces, double velocities);
 
 /// Power that friction takes from the body: bound |w_tau|, or what the regularised law leaves of it.
 double friction_power(const Friction& friction, double bound, double slip_speed);

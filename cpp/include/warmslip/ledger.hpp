@@ -9,14 +9,16 @@ namespace warmslip {
 /// What the ledger reads of one time level; what belongs to an absent block is null or empty.
 struct Level {
   VecHandle u, w, theta;                      ///< displacement, velocity, temperature
-  VecHandle strained;                         ///< u but for a rigid motion, where the body has no support
+  VecHandle strained, strained_w;             ///< u and w but for rigid motions, where the body has no support
+  Eigen::VectorXd rigid;                      ///< and the velocities of the rigid motion that w has besides
   VecHandle momentum, elastic_u, mass_theta;  ///< rho M w, A u, M theta
   VecHandle expansion_theta, heating_w;       ///< G theta, E w
   Eigen::VectorXd contact_u, gap;             ///< u at the contact points (d points), g (points)
   Eigen::VectorXd contact_force;              ///< lambda of the step that ends here (d points)
 
-  /// The displacement that the elastic forces see.
+  /// The displacement and the velocity that inner forces see.
   Vec shape() const { return strained ? strained : u; }
+  Vec straining() const { return strained_w ? strained_w : w; }
 };
 
 /// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0. Those of
@@ -56,6 +58,9 @@ class Bookkeeper {
   Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
              const ContactSurface<d>& surface);
 
+  /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
+  void rigid_share(double share) { rigid_share_ = share; }
+
   /// Closes the books of the step from `before` to `after` (collective).
   Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
 
@@ -89,8 +94,8 @@ class Bookkeeper {
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
   std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;      // a node
-  bool supported_ = false;                  // whether any node of any rank is clamped
-  Point<d> centroid_;                       // moments are taken about it
+  double rigid_share_ = 1;
+  Point<d> centroid_;  // moments are taken about it
 };
 
 }  // namespace warmslip

@@ -48,11 +48,15 @@ class RigidMotions {
   /// inner -= V a, then x = inner + Z a: with inner = K~^-1 (b - E lambda) the solution, and the part of it that
   /// strains.
   void add(const Eigen::VectorXd& motions, Vec inner, Vec x) const;
-  /// x -= the motion that is nearest to it, in the sum of squares over the nodes.
-  void remove(Vec x) const;
+  /// x -= the motion that is nearest to it, in the sum of squares over the nodes; its components.
+  Eigen::VectorXd remove(Vec x) const;
+  /// x += Z a
+  void carry(const Eigen::VectorXd& motions, Vec x) const;
 
-  const Eigen::MatrixXd& inertia() const { return inertia_; }                      ///< H
-  Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }  ///< a column of W
+  const Eigen::MatrixXd& inertia() const { return inertia_; }  ///< H
+  double share() const { return share_; }  ///< the largest entry of V: how far the mass holds the motions by itself
+  Vec motion(Eigen::Index i) const { return motions_[static_cast<std::size_t>(i)]; }  ///< a column of Z
+  Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }     ///< a column of W
 
  private:
   Eigen::VectorXd dots(const std::vector<VecHandle>& with, Vec x) const;
@@ -61,6 +65,7 @@ class RigidMotions {
   std::vector<VecHandle> motions_, inner_, along_;  // Z, V, W
   std::vector<PetscInt> springs_;                   // global unknowns, one a motion
   std::vector<double> stiffness_;
+  double share_ = 0;
   Eigen::MatrixXd inertia_, gram_, at_springs_;  // H, Z^T Z, Z at the springs
 };
 

@@ -29,6 +29,7 @@ struct StepperOptions {
   Backend backend = Backend::automatic;
   ContactOptions contact{};
   double refinement = 5e-12;      ///< equations that leave more get iterative refinement, see Ledger::force_defect
+  double row_refinement = 1e-12;  ///< as does a row that leaves more of its own terms, see Ledger::force_residual
   int passes = 6;                 ///< of it at most, while they help
   double identity_bound = 1e-10;  ///< a step whose balances leave more is not right, see Ledger::energy_residual
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
@@ -116,7 +117,7 @@ class Stepper {
   void take_vectors();
   void momentum_right_side(const StepLoads& loads);
   Eigen::VectorXd reduce(Vec right, Vec external);
-  void expand(const ContactSolution<d>& contact, Vec out, Vec strained);
+  Eigen::VectorXd expand(const ContactSolution<d>& contact, Vec out, Vec strained);
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
   StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
@@ -156,7 +157,8 @@ class Stepper {
   std::unique_ptr<ContactSolver<d>> contact_;
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
-  VecHandle strained_w_, correction_strained_;   // velocity but for a rigid motion, where the body has no support
+  VecHandle correction_strained_;                // the correction but for a rigid motion
+  Eigen::MatrixXd carried_;                      // velocities of the contact points in the rigid motions
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for rigid_ and constants_
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
   Eigen::VectorXd free_;                         // velocity of the contact points without contact force

@@ -127,7 +127,6 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   cooled_.resize(clamped_.size());
   for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
-  supported_ = layout.sum(static_cast<double>(operators.clamped.size())) > 0;
   interpolate_anew();
 }
 
@@ -192,7 +191,7 @@ template <int d>
 Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
   Ledger ledger{};
   work_magnitude_ = 0;
-  multiply(operators_.viscosity, after.w, viscous_w_);
+  if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
   if (surface_.points() > 0) contact(before, after, in, ledger);
@@ -277,7 +276,7 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
   l.elastic_change = l.elastic - elastic_before;
   l.inertia_damping = 0.5 * dot_of_changes(layout_, after.w, before.w, after.momentum, before.momentum);
   l.elastic_damping = 0.5 * dot_of_changes(layout_, after.shape(), before.shape(), after.elastic_u, before.elastic_u);
-  l.viscous = in.k * dot(after.w, viscous_w_);
+  l.viscous = in.k * dot(after.straining(), viscous_w_);
   l.load_work = in.k * dot(in.force, after.w);
   l.expansion_work = in.k * dot(in.expansion_theta, after.w);
   const double contact_before = l.contact - l.contact_change;
@@ -299,8 +298,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   enum { defect, backward, acting, applied, strained, inner };
   std::array<double, 6> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double u = std::max(largest(after.u), largest(before.u)), w = largest(after.w),
-               w_both = std::max(w, largest(before.w)), theta = largest(in.coupling_theta);
+  const double u = std::max(largest(after.shape()), largest(before.shape())), w = largest(after.straining()),
+               w_both = std::max(largest(after.w), largest(before.w)), theta = largest(in.coupling_theta);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
@@ -323,7 +322,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         l.support_work += in.k * left.dot(way);
       } else {
         // inner forces cancel in the sum over a body
-        force.add(position, external, (supported_ ? magnitude : Point<d>(moved + given)).maxCoeff());
+        force.add(position, external, Point<d>(moved + given + rigid_share_ * (magnitude - moved - given)).maxCoeff());
         raise(defect, left.cwiseAbs().maxCoeff());
         for (int a = 0; a < d; ++a)
           if (magnitude[a] > std::numeric_limits<double>::min()) raise(backward, std::abs(left[a]) / magnitude[a]);

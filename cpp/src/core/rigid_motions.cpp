@@ -140,6 +140,7 @@ void RigidMotions::prepare(Factor& factor, const Apply& mass) {
     WARMSLIP_PETSC(VecWAXPY(w, -1, v, z));
     PetscReal size;
     WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &size));
+    share_ = std::max(share_, std::min(1.0, size));
     if (size > 0.5) {  // a mass that holds the motion well: Z - V would cancel
       WARMSLIP_PETSC(VecSet(right, 0));
       {
@@ -187,9 +188,13 @@ void RigidMotions::add(const Eigen::VectorXd& motions, Vec inner, Vec x) const {
   combine(motions_, motions, x);
 }
 
-void RigidMotions::remove(Vec x) const {
-  if (!empty()) combine(motions_, -gram_.ldlt().solve(dots(motions_, x)), x);
+Eigen::VectorXd RigidMotions::remove(Vec x) const {
+  const Eigen::VectorXd motions = gram_.ldlt().solve(dots(motions_, x));
+  combine(motions_, -motions, x);
+  return motions;
 }
+
+void RigidMotions::carry(const Eigen::VectorXd& motions, Vec x) const { combine(motions_, motions, x); }
 
 template RigidMotions::RigidMotions(const Layout<2>&, int, const std::vector<std::string>&,
                                     const std::vector<std::string>&);

@@ -56,9 +56,9 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   take(theta, now_.theta, "theta");
   now_.gap = gap;
   time_ = time;
-  if (now_.heating_w) multiply(operators_.heating, now_.w, now_.heating_w);
-  products(now_);
   forget();
+  if (now_.heating_w) multiply(operators_.heating, now_.straining(), now_.heating_w);
+  products(now_);
 }
 
 template <int d>
@@ -74,9 +74,11 @@ void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<
 template <int d>
 void Stepper<d>::forget() {
   if (contact_) contact_->forget();
-  if (!now_.strained) return;
+  if (rigid_.empty()) return;
   WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
+  WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));
   rigid_.remove(now_.strained);
+  now_.rigid = rigid_.remove(now_.strained_w);
   products(now_);
 }
 
@@ -98,10 +100,11 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
 template <int d>
 StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>& contact) {
   if (next_.w) WARMSLIP_PETSC(VecWAXPY(next_.u, options_.k, next_.w, now_.u));
-  if (next_.strained) WARMSLIP_PETSC(VecWAXPY(next_.strained, options_.k, strained_w_, now_.strained));
+  if (next_.strained) WARMSLIP_PETSC(VecWAXPY(next_.strained, options_.k, next_.strained_w, now_.strained));
   next_.gap = loads.gap;
   if (contact_) next_.contact_force = contact.force;
-  if (next_.heating_w) multiply(operators_.heating, next_.w, next_.heating_w);  // before the heat that may ask for it
+  if (next_.heating_w)
+    multiply(operators_.heating, next_.straining(), next_.heating_w);  // before the heat that may ask for it
   if (heat_) solve_heat(loads, options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w);
   products(next_);
   return inputs(loads, contact);
@@ -140,7 +143,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     again.stage = std::max(again.stage, contact.stage);
     if (apply) contact = std::move(again);
   }
-  expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
+  const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
   if (monolithic) {
     split(coupled_, correction_w_, correction_theta_);
     note(errors_.theta, scales_.theta, largest_entry(correction_theta_), largest_entry(next_.theta));
@@ -157,7 +160,10 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
          std::max(largest_entry(contact.force), ledger.force_scale));
   if (apply) {
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
-    if (strained_w_) WARMSLIP_PETSC(VecAXPY(strained_w_, 1, correction_strained_));
+    if (!rigid_.empty()) {
+      WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
+      next_.rigid += motions;
+    }
   }
   return true;
 }
@@ -173,9 +179,11 @@ void Stepper<d>::correct_heat(const StepInputs& inputs, bool apply) {
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
 template <int d>
 Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
-  const double enough = options_.refinement;
+  const double enough = options_.refinement, rows = enough / options_.row_refinement;
+  const auto warmth = [&] { return std::max(ledger.heat_defect, rows * ledger.heat_residual); };
   const auto motion = [&] {
-    return std::max({ledger.force_defect, ledger.law_residual, monolithic() ? ledger.heat_defect : 0.0});
+    return std::max(
+        {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
   };
   bool refined = false, warmed = false;
   for (int pass = 0; momentum_ && pass < options_.passes && motion() > enough; ++pass) {
@@ -186,14 +194,14 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     refined = true;
     if (!(motion() < 0.5 * before)) break;
   }
-  for (int pass = 0; heat_ && pass < options_.passes && ledger.heat_defect > enough; ++pass) {
-    const double before = ledger.heat_defect;
+  for (int pass = 0; heat_ && pass < options_.passes && warmth() > enough; ++pass) {
+    const double before = warmth();
     correct_heat(inputs(loads, contact), true);
     products(next_);
     ledger = balance(inputs(loads, contact));
     ++cost_.refinements;
     warmed = true;
-    if (!(ledger.heat_defect < 0.5 * before)) break;
+    if (!(warmth() < 0.5 * before)) break;
   }
   if (!measured_now()) return ledger;
   const int before = substitutions();

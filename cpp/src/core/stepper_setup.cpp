@@ -54,6 +54,7 @@ void Stepper<d>::take_factors() {
           multiply(operators_.inertia, x, y);
           WARMSLIP_PETSC(VecScale(y, 1 / k));
         });
+      if (!rigid_.empty()) books_.rigid_share(rigid_.share());
     }
     if (conducts) {
       const MatHandle h = heat_matrix(operators_, k);
@@ -76,8 +77,11 @@ void Stepper<d>::take_factors() {
   // more contact points than nodes: sticking forces are shared in many ways, see ContactSolver::factor and share_least
   if (surface_.points() > surface_.nodes()) contact.proximal = 1e-8;
   RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), rigid_.inertia()};
-  for (Eigen::Index j = 0; j < rigid_.count(); ++j)
+  carried_ = apart.motions;
+  for (Eigen::Index j = 0; j < rigid_.count(); ++j) {
     apart.motions.col(j) = surface_.at_points(surface_.nodal_values(rigid_.along(j)));
+    carried_.col(j) = surface_.at_points(surface_.nodal_values(rigid_.motion(j)));
+  }
   contact_ = std::make_unique<ContactSolver<d>>(surface_.at_points(momentum_->compliance()), contact, std::move(apart));
 }
 
@@ -95,7 +99,9 @@ void Stepper<d>::take_vectors() {
     }
     if (operators_.inertia) level->momentum = layout_.vector(d);
     if (operators_.elasticity) level->elastic_u = layout_.vector(d);
-    if (!rigid_.empty()) level->strained = layout_.vector(d);
+    if (!rigid_.empty())
+      for (VecHandle* v : {&level->strained, &level->strained_w}) *v = layout_.vector(d);
+    level->rigid = Eigen::VectorXd::Zero(rigid_.count());
     if (operators_.expansion && moves) level->expansion_theta = layout_.vector(d);
     if (operators_.heating && moves) level->heating_w = layout_.vector(1);
     level->contact_force = Eigen::VectorXd::Zero(surface_.points() * d);
@@ -105,7 +111,7 @@ void Stepper<d>::take_vectors() {
   if (conducts)
     for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout_.vector(1);
   if (!rigid_.empty())
-    for (VecHandle* v : {&momentum_external_, &strained_w_, &correction_strained_}) *v = layout_.vector(d);
+    for (VecHandle* v : {&momentum_external_, &correction_strained_}) *v = layout_.vector(d);
   if (!constants_.empty()) heat_external_ = layout_.vector(1);
   if (moves && conducts && options_.coupling == Coupling::monolithic)
     for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);

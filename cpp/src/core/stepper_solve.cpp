@@ -39,7 +39,11 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads) {
   const double k = options_.k;
   const Vec out = momentum_right_;
   WARMSLIP_PETSC(VecCopy(loads.force, out));
-  if (now_.momentum) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
+  if (now_.momentum && rigid_.empty()) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
+  if (now_.momentum && !rigid_.empty()) {  // seen from the rigid motion so far, whose digits are then none of its own
+    multiply(operators_.inertia, now_.strained_w, correction_w_);
+    WARMSLIP_PETSC(VecAXPY(out, 1 / k, correction_w_));
+  }
   if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
   if (now_.elastic_u) WARMSLIP_PETSC(VecAXPY(out, -1, now_.elastic_u));
   if (!monolithic() && now_.expansion_theta) WARMSLIP_PETSC(VecAXPY(out, 1, now_.expansion_theta));
@@ -79,13 +83,17 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
-// The solution for the right-hand side of the last `reduce` and the forces of the contact; `strained` receives it but
+// The solution for the right-hand side of the last `reduce` and the forces of the contact, and what it has of the
+// rigid motions that are solved for apart; `strained` receives it but
 // for a rigid motion, where such are solved for apart.
 template <int d>
-void Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, Vec strained) {
+Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, Vec strained) {
   const bool apart = !rigid_.empty();
   momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), apart ? strained : out);
-  if (apart) rigid_.add(contact_ ? contact.rigid : rigid_.alone(rigid_load_), strained, out);
+  if (!apart) return {};
+  const Eigen::VectorXd motions = contact_ ? contact.rigid : rigid_.alone(rigid_load_);
+  rigid_.add(motions, strained, out);
+  return motions;
 }
 
 template <int d>
@@ -120,10 +128,15 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
       join(momentum_right_, heat_right_, coupled_right_);
     }
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
+    if (contact_ && !rigid_.empty()) free_ += carried_ * now_.rigid;
   }
   if (contact_ && (!in_range(free_) || !solve_contact(loads, free_, contact_force_, contact))) return false;
   const Timed part(cost_.momentum_seconds);
-  expand(contact, monolithic() ? coupled_ : next_.w, strained_w_);
+  const Eigen::VectorXd motions = expand(contact, monolithic() ? coupled_ : next_.w, next_.strained_w);
+  if (!rigid_.empty()) {
+    next_.rigid = now_.rigid + motions;
+    rigid_.carry(now_.rigid, next_.w);
+  }
   if (monolithic()) split(coupled_, next_.w, next_.theta);
   return true;
 }

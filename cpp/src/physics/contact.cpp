@@ -166,13 +166,20 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
 }
 
 template <int d>
-FrictionDefect friction_defect(const Friction& friction, double bound, const Point<d>& force,
-                               const Point<d>& slip_velocity) {
-  if (friction.regularisation > 0) {
-    const double blunt = std::hypot(slip_velocity.norm(), friction.regularisation);
-    return {(force - bound / blunt * slip_velocity).norm(), 0};
-  }
-  return {force.norm() - bound, bound * slip_velocity.norm() - force.dot(slip_velocity)};
+double friction_defect(const Friction& friction, double bound, const Point<d>& force, const Point<d>& slip_velocity,
+                       double forces, double velocities) {
+  const double speed = slip_velocity.norm();
+  const double smeared = std::hypot(speed, friction.regularisation);
+  const double slips =
+      smeared > 0 ? (force - bound / smeared * slip_velocity).norm() : std::max(force.norm() - bound, 0.0);
+  if (slips == 0) return 0;
+  if (friction.regularisation > 0 || speed == 0) return slips / forces;
+  const double size = force.norm(), beyond = std::max(size - bound, 0.0) / forces;
+  const double sticks = std::max(beyond, speed / velocities);
+  if (size == 0) return std::min(slips / forces, sticks);
+  const Point<d> along = force / size;  // slips the way its force points
+  const double across = (slip_velocity - std::max(slip_velocity.dot(along), 0.0) * along).norm();
+  return std::min({slips / forces, sticks, std::max(std::abs(size - bound) / forces, across / velocities)});
 }
 
 double friction_power(const Friction& friction, double bound, double slip_speed) {
@@ -184,7 +191,7 @@ double friction_power(const Friction& friction, double bound, double slip_speed)
 #define WARMSLIP_INSTANTIATE(d)                                                                                  \
   template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, const OwnCompliance&, \
                                         const Point<d>&, const Point<d>&);                                       \
-  template FrictionDefect friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&);
+  template double friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&, double, double);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

@@ -62,14 +62,13 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
     const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
     const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
-    const FrictionDefect defect = friction_defect<d>(law.friction, bound, f_tau, w_tau);
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
                  away = distance(law.compliance, lambda / point.weight, r);
     const double normal = off == 0 || away == 0 ? 0 : std::min(off / largest, away / reach);
-    const double friction = widest > 0 ? defect.force / widest : defect.force > 0 ? defect.force / largest : 0;
-    const double power = widest > 0 && fastest > 0 ? defect.power / widest / fastest : 0;
-    if (!(normal < std::numeric_limits<double>::infinity())) return std::numeric_limits<double>::infinity();
-    worst = std::max({worst, normal, friction, power});
+    const double friction =
+        friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
+    if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
+    worst = std::max({worst, normal, friction});
   }
   return worst;
 }
