@@ -33,6 +33,10 @@ struct NormalCompliance {
   bool rigid() const { return !custom && stiffness == unlimited; }
   /// The penetration under `pressure` > 0; `r` where the law does not tell (no pressure, the largest, a custom law).
   double penetration(double pressure, double r) const;
+  /// Whether a pressure is the largest one, but for rounding.
+  bool at_limit(double pressure) const { return pressure >= (1 - 1e-10) * most; }
+  /// The penetration from which on the pressure is the largest one; unlimited where there is none.
+  double deepest_rise() const { return most < unlimited ? std::pow(most / stiffness, 1 / exponent) : unlimited; }
   /// s with s + give p_nu(s) = y: what is left of the penetration y > 0 at a point that recedes by `give` (length per
   /// stress) under pressure. Not for custom laws.
   double remaining(double y, double give) const;

@@ -92,6 +92,8 @@ class ContactSolver {
   ContactOptions options_;
   RigidCoupling rigid_;
   double boldness_ = 1;               // of the tangential rows, against the reciprocal of the point's own compliance
+  Eigen::MatrixXd carried_;           // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
+  bool carries_ = false;              // whether a point's own compliance includes the rigid motions
   double give_ = 1;                   // velocity per force, the unit of the rigid motions
   double spectral_ = 0;               // largest row sum of |compliance|, a bound on its eigenvalues
   std::vector<int> factored_;         // statuses the tangent below belongs to

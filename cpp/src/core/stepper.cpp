@@ -185,23 +185,27 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     return std::max(
         {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
   };
+  // a pass whose change is small says that the one before has done its work
+  const auto done = [&](double rest, double error) { return rest <= enough && !(error > 1e-9); };
   bool refined = false, warmed = false;
-  for (int pass = 0; momentum_ && pass < options_.passes && motion() > enough; ++pass) {
-    const double before = motion();
+  double warmer = Errors::unknown;
+  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
+    const double rest = motion(), error = errors_.largest();
     if (!correct_motion(loads, ledger, contact, true)) break;
     ledger = balance(complete(loads, contact));
     ++cost_.refinements;
     refined = true;
-    if (!(motion() < 0.5 * before)) break;
+    if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
   }
-  for (int pass = 0; heat_ && pass < options_.passes && warmth() > enough; ++pass) {
-    const double before = warmth();
+  for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
+    const double rest = warmth();
     correct_heat(inputs(loads, contact), true);
     products(next_);
     ledger = balance(inputs(loads, contact));
     ++cost_.refinements;
+    if (!(warmth() < 0.5 * rest) && warmed && !(errors_.theta < 0.5 * warmer)) break;
+    warmer = errors_.theta;
     warmed = true;
-    if (!(warmth() < 0.5 * before)) break;
   }
   if (!measured_now()) return ledger;
   const int before = substitutions();

@@ -40,13 +40,13 @@ FrictionBound Friction::bound(double pressure, double slip_speed) const {
 }
 
 double NormalCompliance::penetration(double pressure, double r) const {
-  if (custom || pressure <= 0 || pressure >= most || stiffness == 0) return r;
+  if (custom || pressure <= 0 || at_limit(pressure) || stiffness == 0) return r;
   return exponent == 1 ? pressure / stiffness : std::pow(pressure / stiffness, 1 / exponent);
 }
 
 double NormalCompliance::remaining(double y, double give) const {
   if (linear()) return y / (1 + give * stiffness);
-  if (most < unlimited && y - give * most >= penetration(std::nextafter(most, 0), y)) return y - give * most;
+  if (most < unlimited && y - give * most >= deepest_rise()) return y - give * most;
   // convex and rising: from the right, Newton's method falls to the root
   double s = stiffness > 0 && give > 0 ? std::min(y, std::pow(y / (give * stiffness), 1 / exponent)) : y;
   for (int i = 0; i < 60; ++i) {

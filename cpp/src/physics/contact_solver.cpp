@@ -7,6 +7,8 @@
 namespace warmslip {
 namespace {
 
+constexpr int few_steps = 15;  // before other scales are tried
+
 // Whether statuses alone make the tangent.
 template <int d>
 bool by_status(const ContactProblem<d>& problem) {
@@ -27,7 +29,8 @@ double distance(const NormalCompliance& law, double pressure, double r) {
     const double slope = law.tangent(r);
     return slope > 0 ? std::abs(pressure - law.pressure(r)) / slope : unlimited;
   }
-  if (pressure > law.most || law.stiffness == 0) return unlimited;
+  if (law.stiffness == 0) return unlimited;
+  if (law.at_limit(pressure)) return pressure > law.most ? unlimited : std::max(law.deepest_rise() - r, 0.0);
   return std::abs(r - law.penetration(pressure, r));
 }
 
@@ -88,6 +91,11 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
   if (rigid_.motions.size() == 0) rigid_.motions.resize(compliance_.rows(), rigid_.count());
   spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
   give_ = spectral_ > 0 ? spectral_ : 1;
+  carried_ = Eigen::MatrixXd::Zero(d, compliance_.rows());
+  if (rigid_.count() == 0 || rigid_.inertia.isZero(0)) return;
+  const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.motions.transpose());
+  for (Eigen::Index row = 0; row < compliance_.rows(); row += d)
+    carried_.middleCols<d>(row) = rigid_.motions.middleRows<d>(row) * velocities.middleCols<d>(row);
 }
 
 // The compliance of a point by itself; zero where its motion is given.
@@ -95,7 +103,8 @@ template <int d>
 OwnCompliance ContactSolver<d>::own(const ContactProblem<d>& problem, std::size_t i) const {
   const Point<d>& nu = problem.points[i].normal;
   const auto row = static_cast<Eigen::Index>(i) * d;
-  const Tensor2<d> block = compliance_.template block<d, d>(row, row);
+  Tensor2<d> block = compliance_.template block<d, d>(row, row);
+  if (carries_) block += carried_.template middleCols<d>(row);
   const Tensor2<d> tangential = Tensor2<d>::Identity() - nu * nu.transpose();
   const Tensor2<d> across = tangential * block * tangential;
   // of the at most two eigenvalues that are not zero the larger one
@@ -413,13 +422,43 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   solution.velocity = problem.free;
   solution.rigid = Eigen::VectorXd::Zero(rigid_.count());
   if (!problem.free.allFinite()) return solution;
+  const bool massive = rigid_.count() > 0 && !rigid_.inertia.isZero(0);
+  // the rigid motions under the forces that are there: their equations then hold in every iterate
+  const auto move = [&] {
+    solution.rigid.setZero();
+    if (massive)
+      solution.rigid = (give_ * rigid_.inertia)
+                           .fullPivLu()
+                           .solve(problem.rigid - rigid_.motions.transpose() * solution.force);
+  };
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
     solution.stage = stage;
     solution.converged = method();
     if (!solution.converged) solution.force = force;
   };
-  attempt(Stage::newton, [&] { return newton(problem, true, solution); });
+  // a body that lies on the foundation gives way by its deformation, one that hits it as a whole
+  const auto moving = [&](bool carries, int steps) {
+    carries_ = carries;
+    factored_.clear();
+    move();
+    std::swap(options_.newton_steps, steps);
+    const bool found = newton(problem, true, solution);
+    std::swap(options_.newton_steps, steps);
+    carries_ = false;
+    factored_.clear();
+    return found;
+  };
+  attempt(Stage::newton, [&] {
+    move();
+    return massive && force.isZero(0) ? moving(false, few_steps) : newton(problem, true, solution);
+  });
+  if (massive)
+    for (const auto& [carries, anew] : {std::pair{true, false}, std::pair{true, true}, std::pair{false, true}})
+      attempt(Stage::restart, [&, carries = carries, anew = anew] {
+        if (anew) solution.force.setZero();
+        return moving(carries, options_.newton_steps);
+      });
   if (rigid_.count() > 0)  // a body that only contact holds: again with all points pressed
     attempt(Stage::restart, [&] {
       solution.rigid.setZero();
@@ -441,7 +480,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       boldness_ = boldness;
       factored_.clear();
       solution.force.setZero();
-      solution.rigid.setZero();
+      move();
       const bool found = newton(problem, true, solution);
       if (boldness_ != 1) factored_.clear();
       boldness_ = 1;
