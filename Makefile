@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs extremes
+.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs extremes envelope
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -37,6 +37,9 @@ mutants: setup  ## seeded faults against the tests: which check kills which (ARG
 
 extremes: setup  ## scenes all over the space of data, each judged in 80 digits (ARGS: --families, --count N, --jobs N, --scene laws:50)
 	@$(env) python tests/campaign/run.py $(ARGS)
+
+envelope: setup  ## how far each datum of five scenes can be moved (ARGS: --scenes, --axes, --jobs N)
+	@$(env) python tests/campaign/envelope.py $(ARGS)
 
 docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)

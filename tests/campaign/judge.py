@@ -3,7 +3,8 @@
     right                      ended right, and every field is the reference's to 1e-6 of its size
     silently_wrong             ended right, and a field is not
     stopped_though_solvable    a named outcome, although doubles can hold the answer
-    ill_posed_and_said         a named outcome, and one unit in the last place of the data moves the answer
+    ill_posed_and_said         a named outcome, and one unit in the last place of the data moves the answer, or the rounding of
+                               displacements the stress
     ill_posed_unsaid           ended right, not within 1e-6, but nearer than the data are known
     refused                    before it started, with a reason
     crash, hang                neither
@@ -176,6 +177,18 @@ class Judge:
             out[name] = 0.0 if worst == 0 else worst / scale if scale > 0 else float("inf")
         return out
 
+    def rounding(self, states: list[State], scales: dict[str, float]) -> float:
+        """How far the stress moves when u, w and theta are rounded to doubles, over the largest stress; 0 where there is none."""
+        if not self.moves:
+            return 0.0
+        forms, worst, size = self.scheme.forms, 0.0, 0.0
+        for s in states[1:]:
+            exact = forms.stress(s.u.ravel(), s.w.ravel(), s.theta)
+            near = forms.stress(big(floats(s.u)).ravel(), big(floats(s.w)).ravel(), big(floats(s.theta)))
+            worst = max(worst, float(np.abs(floats(near - exact)).max()))
+            size = max(size, float(np.abs(floats(exact)).max()))
+        return worst / size if size > 1e-40 * scales["stress"] else 0.0
+
     def spread(
         self, reference: list[State], fields: dict[str, list[Any]], scales: dict[str, float]
     ) -> dict[str, float]:
@@ -221,7 +234,7 @@ def row_of(ran: Ran, verdict: str) -> dict[str, Any]:
     """What the run itself says, with room for the judgement."""
     row: dict[str, Any] = {"class": verdict, "outcome": ran.outcome, "reason": ran.reason, "taken": len(ran.states)}
     row |= {f"error_{name}": "" for name in FIELDS} | {f"spread_{name}": "" for name in FIELDS}
-    row |= {f"left_{name}": "" for name in LEFT} | {"way": "", "digits": ran.digits}
+    row |= {f"left_{name}": "" for name in LEFT} | {"rounding": "", "way": "", "digits": ran.digits}
     row |= {"newton_largest": max(ran.newton, default=0), "newton_mean": sum(ran.newton) / max(1, len(ran.newton))}
     return row | {"run_seconds": ran.seconds, "judge_seconds": 0.0}
 
@@ -256,6 +269,8 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
         spread = it.spread(reference, fields, scales)
     held = max(spread.values(), default=0.0) <= HELD
     if ran.outcome != "right":
+        row["rounding"] = it.rounding(reference, scales)
+        held = held and row["rounding"] <= TOLERANCE
         row["class"] = "stopped_though_solvable" if held else "ill_posed_and_said"
     elif clean:
         row["class"] = "right"

@@ -252,7 +252,7 @@ class Contact:
             elif law.rubs or largest(tangential):
                 found.append(max(norm(tangential) - T, ZERO, key=float) / force)
                 if above(speed):
-                    found.append(abs(T * slip - tangential @ v[q, 1:]) / (force * speed))
+                    found.append(abs(T * slip - tangential @ v[q, 1:]) / (max(force, T, key=float) * speed))
             worst = max([worst, *found], key=float)
         return float(worst)
 

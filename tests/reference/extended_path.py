@@ -18,7 +18,7 @@ OPEN, TOUCHING, CAPPED = range(3)
 STICK, PLUS, MINUS = 0, 1, -1
 LONGEST = 300  # pieces of a path
 ROUNDS = 20  # of tangents to laws that bend
-SHORTEST = 1e-5  # part of a continuation
+PARTS = 300  # of a continuation
 Side = tuple[
     Any, Any, "Piece", str
 ]  # value a + t b that stays positive, what comes where it ends, and what then is positive
@@ -43,7 +43,9 @@ def answer(contact: Contact, guesses: list[Big]) -> tuple[Big, str]:
         *(("newton", lambda g=g: contact.newton(g)) for g in [*guesses, rest]),  # type: ignore[misc]
         *(("path", lambda s=s: path(contact, s)) for s in range(3) if plane),  # type: ignore[misc]
         ("tangents", lambda: tangents(contact)),
-        ("continuation", lambda: continuation(contact)),
+        ("pulled", lambda: pulled(contact)),
+        ("roughened", lambda: roughened(contact)),
+        *(("pulled", lambda s=s: pulled(contact, s)) for s in (1, 2)),  # type: ignore[misc]
         ("line search", lambda: contact.newton(rest, 120, damped=True)),
     ]
     for name, attempt in tries:
@@ -201,18 +203,34 @@ def tangents(contact: Contact) -> Big | None:
     return None
 
 
-def continuation(contact: Contact) -> Big | None:
-    """Newton along the pull of `opened`, in parts as short as need be."""
-    lam, start = opened(contact)
+def pulled(contact: Contact, seed: int = 0) -> Big | None:
+    """Newton while the pull of `opened` is reduced."""
+    lam, start = opened(contact, seed)
+    return _followed(lambda t: replace(contact, z=mid(start + big(t) * (contact.z - start))), lam)
+
+
+def roughened(contact: Contact) -> Big | None:
+    """Newton while friction grows from none."""
+
+    def at(t: float) -> Contact:
+        share = big(t)
+        laws = [replace(x, coefficient=x.coefficient * share, cohesion=x.cohesion * share) for x in contact.laws]
+        return replace(contact, laws=laws)
+
+    smooth = at(0.0).newton(zeros(contact.P, contact.d))
+    return None if smooth is None else _followed(at, smooth)
+
+
+def _followed(at: Callable[[float], Contact], lam: Big) -> Big | None:
+    """Newton from t = 0 to 1, in parts as short as need be."""
     t, part = 0.0, 0.25
-    while t < 1:
+    for _ in range(PARTS):
         here = min(t + part, 1.0)
-        z = mid(start + big(here) * (contact.z - start))
-        found = Contact(contact.W, z, contact.r0, contact.k, contact.weights, contact.laws).newton(lam, 15)
+        found = at(here).newton(lam, 15)
         if found is None:
             part /= 4
-            if part < SHORTEST:
-                return None
             continue
-        lam, t, part = found, here, min(2 * part, 0.25)
-    return lam
+        lam, t, part = found, here, min(4 * part, 0.25)
+        if t == 1.0:
+            return lam
+    return None

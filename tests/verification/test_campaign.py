@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import judge, sample
+from campaign import envelope, judge, sample
 from campaign.run import judged, main, one, summary
 from campaign.workers import rehearse, served
 from reference import exact_cases, exact_numbers, scipy_scheme
@@ -238,3 +238,22 @@ def test_command(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert {"campaign.csv", "campaign_summary.csv", "campaign.json"} <= {p.name for p in out.iterdir()}
     assert one("supported:1") == 0
     assert "[elasticity]" in capsys.readouterr().out
+
+
+def test_envelope_finds_where_a_run_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def verdict(name: str, axis: str, exponent: float) -> str:
+        asked.append(exponent)
+        return "right" if -1.3 < exponent < 9 else "stopped_though_solvable"
+
+    monkeypatch.setattr(envelope, "verdict", verdict)
+    assert envelope.edge("paper", "step", -8) == (-1.25, "stopped_though_solvable")
+    assert envelope.edge("paper", "step", 8) == (8.0, "")
+    assert min(asked) == -2.0
+
+
+def test_envelope_has_an_axis_where_the_scene_has_a_datum() -> None:
+    lines = envelope.table(["free"], ["stiffness", "load", "expansion"])
+    assert [line["axis"] for line in lines] == ["expansion"]
+    assert lines[0]["smallest"] <= 1 <= lines[0]["largest"]
