@@ -32,6 +32,24 @@ def mandel(table: IsotropicTable, dim: int) -> Array:
     return tensor
 
 
+def out_of_plane(
+    elasticity: IsotropicTable | None, viscosity: IsotropicTable | None, expansion: Array | None
+) -> tuple[float, float, float]:
+    """What tr eps(u), tr eps(w) and minus the warming are multiplied by in sigma_zz: all 0 unless in plane strain.
+
+    A Lame pair without an assumption follows the other tensor. M_zz is taken to be the mean of M_xx and M_yy, which is M where it
+    is a number. Of a full tensor sigma_zz is not known, and 0.
+    """
+    tables = [table for table in (elasticity, viscosity) if table is not None]
+    if not any(table.strained for table in tables) or any(table.tensor is not None for table in tables):
+        return 0.0, 0.0, 0.0
+    lam = [
+        table.pair(2)[0] if table is not None and table.assumption != "plane_stress" else 0.0
+        for table in (elasticity, viscosity)
+    ]
+    return lam[0], lam[1], float(np.trace(expansion)) / 2 if expansion is not None else 0.0
+
+
 def _matrix(value: Any, dim: int) -> Array:
     return np.array(value, dtype=float) if isinstance(value, list) else value * np.eye(dim)
 
@@ -67,7 +85,9 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
             return getattr(region, name, None) or getattr(scene, name)
 
         inertia, heat = table("inertia"), table("heat")
-        coupling = {name: getattr(heat, name, None) or getattr(scene.heat, name, None) for name in COUPLINGS}
+        given = {name: getattr(heat, name, None) or getattr(scene.heat, name, None) for name in COUPLINGS}
+        coupling = {name: _matrix(value.tensor, d) if value is not None else None for name, value in given.items()}
+        zz = out_of_plane(table("elasticity"), table("viscosity"), coupling["expansion"])
         return of_dim("Material", d)(
             density=inertia.density if inertia is not None else 0.0,
             **{
@@ -75,8 +95,10 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
                 for name in ("elasticity", "viscosity")
             },
             conductivity=_matrix(heat.conductivity, d) if heat is not None else None,
-            **{name: _matrix(value.tensor, d) if value is not None else None for name, value in coupling.items()},
+            **coupling,
             capacity=heat.capacity if heat is not None else 1.0,
+            reference=0.0,
+            out_of_plane=zz if d == 2 else (0.0, 0.0, 0.0),
         )
 
     return [material(None), *(material(region) for region in scene.regions.values())], cell_regions(

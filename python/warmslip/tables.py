@@ -151,13 +151,14 @@ class IsotropicTable(Table):
     or any symmetric `tensor` that takes engineering strains (xx, yy, xy) or (xx, yy, zz, yz, xz, xy) to stresses."""
 
     lame: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
-    """[lambda, mu]: stress of an elasticity, stress times time of a viscosity."""
+    """[lambda, mu]: stress of an elasticity, stress times time of a viscosity. In the plane the stress along z is 0 unless an
+    assumption says plane_strain, here or in the other of elasticity and viscosity: lambda and mu are then those in space."""
     young: NonNegative | None = None
     """Young's modulus; with poisson and assumption."""
     poisson: Finite | None = None
     """Poisson's ratio, between -1 and 0.5 (1 in plane stress)."""
     assumption: Literal["plane_stress", "plane_strain", "solid"] | None = None
-    """What holds along the third axis; solid in space."""
+    """What holds along the third axis; solid in space. Plane strain has a stress along z, which von Mises counts."""
     tensor: list[list[Finite]] | None = None
     """Symmetric 3 x 3 (plane) or 6 x 6 (space) matrix from engineering strains to stresses."""
 
@@ -173,8 +174,12 @@ class IsotropicTable(Table):
             if any(self.tensor[i][j] != self.tensor[j][i] for i in range(size) for j in range(i)):
                 raise ValueError("tensor must be symmetric; set its entries [i][j] and [j][i] equal")
             return self
-        if self.lame is not None and any(value is not None for value in engineering):
+        if self.lame is not None and (self.young is not None or self.poisson is not None):
             raise ValueError("give either lame or young, poisson and assumption, not both")
+        if self.lame is not None and self.assumption == "plane_stress":
+            raise ValueError(
+                "lame with plane_stress leaves open which pair is meant; give young and poisson, or leave it out"
+            )
         if self.lame is None and any(value is None for value in engineering):
             raise ValueError("give lame = [lambda, mu], or young, poisson and assumption together")
         if self.poisson is not None:
@@ -182,6 +187,11 @@ class IsotropicTable(Table):
             if not -1 < self.poisson < top:
                 raise ValueError(f"poisson must lie between -1 and {top:g} for {self.assumption}, got {self.poisson:g}")
         return self
+
+    @property
+    def strained(self) -> bool:
+        """Whether the strain along the third axis is 0 and the stress is not, as this table says."""
+        return self.assumption in ("plane_strain", "solid")
 
     def pair(self, dim: int) -> tuple[float, float]:
         """(lambda, mu) for `dim` dimensions, stress (or viscosity). Plane stress: E k/(1-k^2), E/(2(1+k))."""
