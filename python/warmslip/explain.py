@@ -8,7 +8,7 @@ from typing import Any
 from warmslip.consistency import contact_keys
 from warmslip.expressions import constant
 from warmslip.scene import Scene
-from warmslip.tables import ContactTable
+from warmslip.tables import ContactTable, ExpansionTable, HeatingTable
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,18 @@ def removable(scene: Scene) -> dict[str, str]:
     if scene.heat is not None:
         for name in ("expansion", "heating"):
             table = getattr(scene.heat, name)
-            if table is not None and _zero(table.tensor):
+            if table is not None and _no_effect(table):
                 out[f"heat.{name}"] = "the tensor is 0"
         heated = scene.heat.heating is not None and "heat.heating" not in out
         if not heated and _stays_cold(scene):
             out["heat"] = "nothing warms the body: the temperature stays 0"
     return out
+
+
+def _no_effect(coupling: ExpansionTable | HeatingTable) -> bool:
+    """Whether M or R is 0, as far as its own table says."""
+    given = [coupling.tensor, getattr(coupling, "alpha", None)]
+    return any(one is not None and _zero(one) for one in given)
 
 
 def _of_contact(contact: ContactTable) -> dict[str, str]:

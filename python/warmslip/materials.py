@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core, mesh_files
+from warmslip.consistency import coupling_tables
 from warmslip.expressions import Expression
 from warmslip.laws import Watched
 from warmslip.loads import Array
 from warmslip.refinement import refined
 from warmslip.scene import Scene
 from warmslip.tables import ContactTable, IsotropicTable, MeshTable, RegionTable
-
-COUPLINGS = ("expansion", "heating")
 
 
 def of_dim(name: str, dim: int) -> Any:
@@ -48,6 +47,25 @@ def out_of_plane(
         for table in (elasticity, viscosity)
     ]
     return lam[0], lam[1], float(np.trace(expansion)) / 2 if expansion is not None else 0.0
+
+
+def couplings(scene: Scene, region: RegionTable | None) -> tuple[Array | None, Array | None, float]:
+    """M and R of the body or of a region, (d, d), and the temperature without thermal stress; None for what is absent."""
+    d = scene.mesh.dim
+    expansion, heating, reference = coupling_tables(scene, region)
+    stress: Array | None = None
+    if expansion is not None and expansion.alpha is not None:
+        elasticity = (region and region.elasticity) or scene.elasticity
+        assert elasticity is not None
+        stress = expansion.alpha * elasticity.per_expansion(d) * np.eye(d)
+    elif expansion is not None:
+        stress = _matrix(expansion.tensor, d)
+    if heating is None:
+        return stress, None, reference
+    if heating.thermodynamic:
+        assert stress is not None
+        return stress, -reference * stress, reference
+    return stress, _matrix(heating.tensor, d), reference
 
 
 def _matrix(value: Any, dim: int) -> Array:
@@ -85,9 +103,8 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
             return getattr(region, name, None) or getattr(scene, name)
 
         inertia, heat = table("inertia"), table("heat")
-        given = {name: getattr(heat, name, None) or getattr(scene.heat, name, None) for name in COUPLINGS}
-        coupling = {name: _matrix(value.tensor, d) if value is not None else None for name, value in given.items()}
-        zz = out_of_plane(table("elasticity"), table("viscosity"), coupling["expansion"])
+        expansion, heating, reference = couplings(scene, region)
+        zz = out_of_plane(table("elasticity"), table("viscosity"), expansion)
         return of_dim("Material", d)(
             density=inertia.density if inertia is not None else 0.0,
             **{
@@ -95,9 +112,10 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
                 for name in ("elasticity", "viscosity")
             },
             conductivity=_matrix(heat.conductivity, d) if heat is not None else None,
-            **coupling,
-            capacity=heat.capacity if heat is not None else 1.0,
-            reference=0.0,
+            expansion=expansion,
+            heating=heating,
+            capacity=getattr(heat, "capacity", None) or (scene.heat.capacity if scene.heat is not None else 1.0),
+            reference=reference,
             out_of_plane=zz if d == 2 else (0.0, 0.0, 0.0),
         )
 

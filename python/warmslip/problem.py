@@ -206,7 +206,7 @@ def discretise(
         clamped=list(scene.supports.displacement),
         cooled=list(scene.supports.temperature),
         contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
-        lumped=False,
+        lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
     )
     layout = of_dim("Layout", d)(comm, mesh)
     surface = of_dim("ContactSurface", d)(layout, problem)
@@ -216,14 +216,15 @@ def discretise(
             raise ValueError(
                 f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
             )
-    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm)
+    operators = of_dim("Operators", d)(layout, problem)
+    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
     return Discretisation(
         scene,
         loads,
         mesh,
         problem,
         layout,
-        of_dim("Operators", d)(layout, problem),
+        operators,
         surface,
         of_dim("Norms", d)(layout),
         vectors,

@@ -50,7 +50,7 @@ std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem);
 template <int d>
 class LoadQuadrature {
  public:
-  /// Volume when `part` is empty. `points` per direction (exact to degree 2 points - 1).
+  /// Volume when `part` is empty. `points` per direction (exact to degree 2 points - 1), 0 for the vertices.
   LoadQuadrature(const Layout<d>& layout, const std::optional<std::string>& part, int points);
 
   RealTable<d> positions() const { return positions_; }  ///< (points, d)
