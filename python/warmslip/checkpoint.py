@@ -84,6 +84,7 @@ def save(folder: Path, job: Run) -> None:
         "floors": job.floors,
         "newton_max": job.newton_max,
         "stages": job.stages,
+        "seen": job.watch.seen,
     }
     arrays = {name: values for name, values in fields.items() if values is not None}
     arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
@@ -195,4 +196,5 @@ def load(folder: Path, job: Run) -> int:
     job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
     job.worst, job.floors = record["worst"], record["floors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
+    job.watch.seen |= record.get("seen", {})
     return int(record["step"])
