@@ -58,6 +58,8 @@ void bind(py::module_& m) {
   m.def("stress", &stress<d>, py::arg("problem"), py::arg("u"), py::arg("w"), py::arg("theta"),
         "Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a "
         "field the problem does not have may be empty.");
+  m.def("largest_strain", &largest_strain<d>, py::arg("mesh"), py::arg("u"),
+        "Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.");
   m.def("stress_out_of_plane", &stress_out_of_plane<d>, py::arg("problem"), py::arg("u"), py::arg("w"),
         py::arg("theta"), "sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.");
 }

@@ -9,7 +9,7 @@ import numpy.typing
 import petsc4py.PETSc
 import scipy.sparse
 import typing
-__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
 class Diagonal:
     """
     Members:
@@ -1339,6 +1339,16 @@ def heat_matrix(operators: Operators2, k: typing.SupportsFloat | typing.Supports
 def heat_matrix(operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
     M / k + D + J, cooled.
+    """
+@typing.overload
+def largest_strain(mesh: Mesh2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> float:
+    """
+    Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
+    """
+@typing.overload
+def largest_strain(mesh: Mesh3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> float:
+    """
+    Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
     """
 @typing.overload
 def momentum_matrix(layout: Layout2, problem: Problem2, operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:

@@ -130,6 +130,10 @@ class Discretisation:
         none = np.empty((0, self.dim))
         return none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
 
+    def largest_strain(self, u: Array) -> float:
+        """Largest principal strain, in size, of all cells for a nodal displacement (nodes, d); dimensionless."""
+        return _core.largest_strain(self.mesh, u)
+
     def mises_of(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
         """Von Mises stress of nodal fields at the centroids, (cells,); that of a plane counts the stress along z."""
         return von_mises(self.stress(u, w, theta), self.stress_zz(u, w, theta) if self.dim == 2 else None)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warmslip import plausibility as say
-from warmslip.foresight import TIMES, before, gradients, size
-from warmslip.loads import Array, Formula, evaluate, of_time
+from warmslip.foresight import TIMES, before, size
+from warmslip.loads import Formula, evaluate, of_time
 from warmslip.loads import data as read
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Watch:
         if n & (n - 1) == 0:
             self._temperatures()
         energy = report.ledger.elastic
-        if energy > 4 * seen["energy"] and n - seen["looked"] >= self._job.scene.time.steps / 8:
+        if energy > 4 * seen["energy"] and n - seen["looked"] >= self._job.scene.time.steps / 4:
             seen["energy"], seen["looked"] = energy, n
             self._strain()
 
@@ -70,13 +70,7 @@ class Watch:
     def _strain(self) -> None:
         u = self._d.field(self._job.stepper.u)
         if u is not None:
-            self.seen["strain"] = max(
-                self.seen["strain"], largest_strain(self._slopes, np.asarray(self._d.mesh.cells), u)
-            )
-
-    @cached_property
-    def _slopes(self) -> Array:
-        return gradients(np.asarray(self._d.mesh.nodes)[np.asarray(self._d.mesh.cells)])
+            self.seen["strain"] = max(self.seen["strain"], self._d.largest_strain(u))
 
     @cached_property
     def _allowed(self) -> tuple[float, float]:
@@ -167,14 +161,3 @@ class Watch:
                 facet = float(weights[of_part == i].max()) ** (1 / (d.dim - 1))
                 out += say.slid(d.scene.contacts[i].part, float(slip[here].max()), facet)
         return out + say.impact(seen["shortest"])
-
-
-def largest_strain(slopes: Array, cells: Array, u: Array) -> float:
-    """Largest principal strain, in size, of all cells for a nodal displacement (nodes, d); dimensionless.
-
-    `slopes` are the gradients of the cells' barycentric coordinates (cells, d+1, d).
-    """
-    gradient = np.einsum("cia,cib->cab", u[cells], slopes)
-    strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    norms = np.einsum("cab,cab->c", strain, strain)  # the principal one is at least 1 / sqrt(d) of the norm
-    return float(np.abs(np.linalg.eigvalsh(strain[norms * strain.shape[1] >= norms.max()])).max())

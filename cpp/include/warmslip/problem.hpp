@@ -92,6 +92,10 @@ template <int d>
 RealTable<d * d> stress(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,
                         const Eigen::VectorXd& theta);
 
+/// Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
+template <int d>
+double largest_strain(const Mesh<d>& mesh, const RealTable<d>& u);
+
 /// sigma_zz of every cell at its centroid, (cells), see OutOfPlane; zero for d = 3, whose stress holds it.
 template <int d>
 Eigen::VectorXd stress_out_of_plane(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -69,11 +70,30 @@ Eigen::VectorXd stress_out_of_plane(const Problem<d>& problem, const RealTable<d
   return sigma;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                     \
-  template RealTable<d * d> stress<d>(const Problem<d>&, const RealTable<d>&, const RealTable<d>&,  \
-                                      const Eigen::VectorXd&);                                      \
-  template Eigen::VectorXd stress_out_of_plane<d>(const Problem<d>&, const RealTable<d>&,           \
-                                                  const RealTable<d>&, const Eigen::VectorXd&);
+template <int d>
+double largest_strain(const Mesh<d>& mesh, const RealTable<d>& u) {
+  if (u.rows() != mesh.nodes.rows())
+    throw std::invalid_argument("u needs one row for each of the " + std::to_string(mesh.nodes.rows()) + " nodes");
+  double largest = 0;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+    const Simplex<d> s = simplex<d>(vertices(mesh, c));
+    Tensor2<d> gradient = Tensor2<d>::Zero();
+    for (int i = 0; i <= d; ++i) gradient += u.row(mesh.cells(c, i)).transpose() * s.gradients.row(i);
+    const Tensor2<d> strain = (gradient + gradient.transpose()) / 2;
+    if (strain.squaredNorm() <= largest * largest) continue;  // which no principal strain exceeds
+    Eigen::SelfAdjointEigenSolver<Tensor2<d>> solver;
+    solver.computeDirect(strain, Eigen::EigenvaluesOnly);
+    largest = std::max(largest, solver.eigenvalues().cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                                    \
+  template RealTable<d * d> stress<d>(const Problem<d>&, const RealTable<d>&, const RealTable<d>&, \
+                                      const Eigen::VectorXd&);                                     \
+  template Eigen::VectorXd stress_out_of_plane<d>(const Problem<d>&, const RealTable<d>&,          \
+                                                  const RealTable<d>&, const Eigen::VectorXd&);    \
+  template double largest_strain<d>(const Mesh<d>&, const RealTable<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 
