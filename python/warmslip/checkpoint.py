@@ -140,6 +140,7 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
         counts = [record["step"], record["newton_max"], *record["stages"].values()]
         return (
             math.isfinite(float.fromhex(record["time"]))
+            and job.watch.fits(record["seen"])
             and all(
                 table.keys() == own.keys() and {type(v) for v in table.values()} == {float} for table, own in tables
             )
@@ -196,5 +197,5 @@ def load(folder: Path, job: Run) -> int:
     job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
     job.worst, job.floors = record["worst"], record["floors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
-    job.watch.seen |= record.get("seen", {})
+    job.watch.seen |= record["seen"]
     return int(record["step"])

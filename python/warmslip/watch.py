@@ -39,6 +39,19 @@ class Watch:
             "high": {},
         }
 
+    def fits(self, seen: Any) -> bool:
+        """Whether what a checkpoint holds is what a watch remembers."""
+        if not isinstance(seen, dict) or seen.keys() != self.seen.keys():
+            return False
+        numbers = [value for name, value in seen.items() if name not in ("low", "high", "phase", "shortest")]
+        numbers += [seen[name] for name in ("phase", "shortest") if seen[name] is not None]
+        for name in ("low", "high"):
+            found = seen[name]
+            if not isinstance(found, dict) or (found and found.keys() != {"bound", "value", "count", "time"}):
+                return False
+            numbers += found.values()
+        return all(type(value) in (int, float) for value in numbers)
+
     def step(self, report: Any, n: int) -> None:
         """After step n (collective when it looks at a field)."""
         seen = self.seen
