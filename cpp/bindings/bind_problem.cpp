@@ -14,12 +14,14 @@ void bind(py::module_& m) {
       .def(py::init([](double density, Four elasticity, Four viscosity, Two conductivity, Two expansion, Two heating,
                        double capacity, double reference, std::array<double, 3> out_of_plane) {
              const auto [elastic, viscous, expanding] = out_of_plane;
-             return M{density, elasticity, viscosity,  conductivity, expansion,
-                      heating, capacity,   reference, {elastic, viscous, expanding}};
+             return M{density,      elasticity, viscosity,
+                      conductivity, expansion,  heating,
+                      capacity,     reference,  {elastic, viscous, expanding}};
            }),
            py::kw_only(), py::arg("density"), py::arg("elasticity"), py::arg("viscosity"), py::arg("conductivity"),
            py::arg("expansion"), py::arg("heating"), py::arg("capacity"), py::arg("reference"), py::arg("out_of_plane"),
-           "`reference` is the temperature without thermal stress; `out_of_plane` what tr eps(u), tr eps(w) and -(theta - "
+           "`reference` is the temperature without thermal stress; `out_of_plane` what tr eps(u), tr eps(w) and "
+           "-(theta - "
            "reference) are multiplied by in sigma_zz of a plane.")
       .def_readonly("density", &M::density)
       .def_readonly("elasticity", &M::elasticity)
@@ -61,7 +63,8 @@ void bind(py::module_& m) {
   m.def("largest_strain", &largest_strain<d>, py::arg("mesh"), py::arg("u"),
         "Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.");
   m.def("stress_out_of_plane", &stress_out_of_plane<d>, py::arg("problem"), py::arg("u"), py::arg("w"),
-        py::arg("theta"), "sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.");
+        py::arg("theta"),
+        "sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.");
 }
 
 }  // namespace

@@ -131,9 +131,8 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
                          [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.viscosity)); });
   if (problem.moves()) clamped = fixed(layout, problem.clamped, d);
   if (!problem.conducts()) return;
-  mass = assemble(layout, problem, 1, 1, [&](const S& s, const M& m) {
-    return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval();
-  });
+  mass = assemble(layout, problem, 1, 1,
+                  [&](const S& s, const M& m) { return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval(); });
   conductivity =
       assemble(layout, problem, 1, 1, [](const S& s, const M& m) { return conduction<d>(s, or_zero(m.conductivity)); });
   if (has(&M::expansion))
@@ -179,7 +178,8 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   MatHandle a = assemble(layout, problem, b, b, [&](const Simplex<d>& s, const Material<d>& m) {
     const VectorBlock<d> motion = momentum<d>(s, m, k);
     const MixedBlock<d> expansion = coupling<d>(s, or_zero(m.expansion)), heating = coupling<d>(s, or_zero(m.heating));
-    const ScalarBlock<d> heat = m.capacity / k * heat_mass<d + 1>(problem, s.volume) + conduction<d>(s, or_zero(m.conductivity));
+    const ScalarBlock<d> heat =
+        m.capacity / k * heat_mass<d + 1>(problem, s.volume) + conduction<d>(s, or_zero(m.conductivity));
     Eigen::Matrix<double, b*(d + 1), b*(d + 1)> block;
     for (int i = 0; i <= d; ++i)
       for (int j = 0; j <= d; ++j) {

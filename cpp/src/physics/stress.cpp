@@ -41,17 +41,17 @@ template <int d>
 RealTable<d * d> stress(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,
                         const Eigen::VectorXd& theta) {
   RealTable<d * d> sigma(problem.mesh->cells.rows(), d * d);
-  at_centroids(problem, u, w, theta,
-               [&](Eigen::Index c, const Material<d>& material, const Mandel<d>& strain, const Mandel<d>& rate,
-                   double warmer) {
-                 Mandel<d> mechanical = Mandel<d>::Zero();
-                 if (material.viscosity) mechanical += *material.viscosity * rate;
-                 if (material.elasticity) mechanical += *material.elasticity * strain;
-                 Tensor2<d> s = from_mandel<d>(mechanical);
-                 if (material.expansion) s -= warmer * *material.expansion;
-                 for (int i = 0; i < d; ++i)
-                   for (int j = 0; j < d; ++j) sigma(c, i * d + j) = s(i, j);
-               });
+  at_centroids(
+      problem, u, w, theta,
+      [&](Eigen::Index c, const Material<d>& material, const Mandel<d>& strain, const Mandel<d>& rate, double warmer) {
+        Mandel<d> mechanical = Mandel<d>::Zero();
+        if (material.viscosity) mechanical += *material.viscosity * rate;
+        if (material.elasticity) mechanical += *material.elasticity * strain;
+        Tensor2<d> s = from_mandel<d>(mechanical);
+        if (material.expansion) s -= warmer * *material.expansion;
+        for (int i = 0; i < d; ++i)
+          for (int j = 0; j < d; ++j) sigma(c, i * d + j) = s(i, j);
+      });
   return sigma;
 }
 
@@ -64,8 +64,8 @@ Eigen::VectorXd stress_out_of_plane(const Problem<d>& problem, const RealTable<d
                  [&](Eigen::Index c, const Material<d>& material, const Mandel<d>& strain, const Mandel<d>& rate,
                      double warmer) {
                    const OutOfPlane& out = material.out_of_plane;
-                   sigma[c] = out.elastic * strain.template head<d>().sum() + out.viscous * rate.template head<d>().sum() -
-                              out.expansion * warmer;
+                   sigma[c] = out.elastic * strain.template head<d>().sum() +
+                              out.viscous * rate.template head<d>().sum() - out.expansion * warmer;
                  });
   return sigma;
 }
@@ -88,11 +88,11 @@ double largest_strain(const Mesh<d>& mesh, const RealTable<d>& u) {
   return largest;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                    \
-  template RealTable<d * d> stress<d>(const Problem<d>&, const RealTable<d>&, const RealTable<d>&, \
-                                      const Eigen::VectorXd&);                                     \
-  template Eigen::VectorXd stress_out_of_plane<d>(const Problem<d>&, const RealTable<d>&,          \
-                                                  const RealTable<d>&, const Eigen::VectorXd&);    \
+#define WARMSLIP_INSTANTIATE(d)                                                                                \
+  template RealTable<d * d> stress<d>(const Problem<d>&, const RealTable<d>&, const RealTable<d>&,             \
+                                      const Eigen::VectorXd&);                                                 \
+  template Eigen::VectorXd stress_out_of_plane<d>(const Problem<d>&, const RealTable<d>&, const RealTable<d>&, \
+                                                  const Eigen::VectorXd&);                                     \
   template double largest_strain<d>(const Mesh<d>&, const RealTable<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
