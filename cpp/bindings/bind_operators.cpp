@@ -48,6 +48,9 @@ void bind(py::module_& m) {
   matrix("expansion", &O::expansion, "m(theta, v)");
   matrix("heating", &O::heating, "e(w, eta)");
   matrix("exchange", &O::exchange, "int k_c theta eta over Gamma_C");
+  operators.def_property_readonly(
+      "reference", [](const O& o) { return share(o.reference); },
+      "m(reference temperature, v), a vector; None where that is 0");
   m.def(
       "momentum_matrix",
       [](const L& l, const Problem<d>& p, const O& o, double k) { return release(momentum_matrix<d>(l, p, o, k)); },

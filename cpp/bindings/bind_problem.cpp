@@ -11,37 +11,60 @@ void bind(py::module_& m) {
   using Two = std::optional<Tensor2<d>>;
   py::class_<M>(m, name<d>("Material").c_str(),
                 "Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.")
-      .def(py::init<double, Four, Four, Two, Two, Two, double>(), py::kw_only(), py::arg("density"),
-           py::arg("elasticity"), py::arg("viscosity"), py::arg("conductivity"), py::arg("expansion"),
-           py::arg("heating"), py::arg("capacity"))
+      .def(py::init([](double density, Four elasticity, Four viscosity, Two conductivity, Two expansion, Two heating,
+                       double capacity, double reference, std::array<double, 3> out_of_plane) {
+             const auto [elastic, viscous, expanding] = out_of_plane;
+             return M{density,      elasticity, viscosity,
+                      conductivity, expansion,  heating,
+                      capacity,     reference,  {elastic, viscous, expanding}};
+           }),
+           py::kw_only(), py::arg("density"), py::arg("elasticity"), py::arg("viscosity"), py::arg("conductivity"),
+           py::arg("expansion"), py::arg("heating"), py::arg("capacity"), py::arg("reference"), py::arg("out_of_plane"),
+           "`reference` is the temperature without thermal stress; `out_of_plane` what tr eps(u), tr eps(w) and "
+           "-(theta - "
+           "reference) are multiplied by in sigma_zz of a plane.")
       .def_readonly("density", &M::density)
       .def_readonly("elasticity", &M::elasticity)
       .def_readonly("viscosity", &M::viscosity)
       .def_readonly("conductivity", &M::conductivity)
       .def_readonly("expansion", &M::expansion)
       .def_readonly("heating", &M::heating)
-      .def_readonly("capacity", &M::capacity);
+      .def_readonly("capacity", &M::capacity)
+      .def_readonly("reference", &M::reference)
+      .def_property_readonly(
+          "out_of_plane",
+          [](const M& m) {
+            return std::array{m.out_of_plane.elastic, m.out_of_plane.viscous, m.out_of_plane.expansion};
+          },
+          "what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz");
   using P = Problem<d>;
   py::class_<P, std::shared_ptr<P>>(m, name<d>("Problem").c_str(), "A mesh with materials, supports and contact parts.")
       .def(
           py::init([](std::shared_ptr<Mesh<d>> mesh, std::vector<M> materials, std::vector<int> regions,
                       std::vector<std::string> clamped, std::vector<std::string> cooled,
-                      std::vector<ContactPart> contacts) {
+                      std::vector<ContactPart> contacts, bool lumped) {
             return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions), std::move(clamped),
-                                         std::move(cooled), std::move(contacts)});
+                                         std::move(cooled), std::move(contacts), lumped});
           }),
           py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("clamped"),
-          py::arg("cooled"), py::arg("contacts"),
-          "`regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.")
+          py::arg("cooled"), py::arg("contacts"), py::arg("lumped"),
+          "`regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; "
+          "`lumped` makes capacity and exchange diagonal.")
       .def_property_readonly("mesh", [](const P& p) { return std::const_pointer_cast<Mesh<d>>(p.mesh); })
       .def_readonly("materials", &P::materials)
       .def_property_readonly(
           "material", [](const P& p) { return p.materials.front(); }, "the first one")
+      .def_readonly("lumped", &P::lumped)
       .def_property_readonly("moves", &P::moves, "Whether there is a velocity to solve for.")
       .def_property_readonly("conducts", &P::conducts, "Whether there is a temperature to solve for.");
   m.def("stress", &stress<d>, py::arg("problem"), py::arg("u"), py::arg("w"), py::arg("theta"),
         "Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a "
         "field the problem does not have may be empty.");
+  m.def("largest_strain", &largest_strain<d>, py::arg("mesh"), py::arg("u"),
+        "Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.");
+  m.def("stress_out_of_plane", &stress_out_of_plane<d>, py::arg("problem"), py::arg("u"), py::arg("w"),
+        py::arg("theta"),
+        "sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.");
 }
 
 }  // namespace

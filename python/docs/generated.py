@@ -58,6 +58,8 @@ def _kind(schema: dict[str, Any]) -> str:
             return _number(schema, "integer")
         case "number":
             return _number(schema, "number")
+        case "boolean":
+            return "true or false"
         case _:
             return f"text like `{schema['pattern'].strip('^$')}`" if "pattern" in schema else "text"
 
@@ -100,7 +102,7 @@ def scene() -> str:
     out += ["", f"Tables {needed} are needed, every other one is a block of the problem that may be absent."]
     for name, where in places.items():
         table = schema["$defs"][name]
-        short = [place for place in where if not place.startswith("regions.NAME.") or name == "RegionHeatTable"]
+        short = [place for place in where if not place.startswith("regions.NAME.") or name.startswith("Region")]
         out += ["", f"## {', '.join(f'[{place}]' for place in short)}", "", _cell(table.get("description", ""))]
         if "contact" in where:
             out += ["", "`[[contact]]` with one table a part when there are several."]

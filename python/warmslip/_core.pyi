@@ -9,7 +9,7 @@ import numpy.typing
 import petsc4py.PETSc
 import scipy.sparse
 import typing
-__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress']
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
 class Diagonal:
     """
     Members:
@@ -174,8 +174,10 @@ class Material2:
     """
     Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.
     """
-    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, out_of_plane: collections.abc.Sequence[float]) -> None:
+        """
+        `reference` is the temperature without thermal stress; `out_of_plane` what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz of a plane.
+        """
     @property
     def capacity(self) -> float:
         ...
@@ -195,21 +197,32 @@ class Material2:
     def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"] | None:
         ...
     @property
+    def out_of_plane(self) -> list[float]:
+        """
+        what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz
+        """
+    @property
+    def reference(self) -> float:
+        ...
+    @property
     def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
 class Problem2:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart]) -> None:
+    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
         """
-        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.
+        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
         """
     @property
     def conducts(self) -> bool:
         """
         Whether there is a temperature to solve for.
         """
+    @property
+    def lumped(self) -> bool:
+        ...
     @property
     def material(self) -> Material2:
         """
@@ -230,8 +243,10 @@ class Material3:
     """
     Density and the constant tensors of (2.1)-(2.4), fourth-order ones in Mandel form; None is absent.
     """
-    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
+    def __init__(self, *, density: typing.SupportsFloat | typing.SupportsIndex, elasticity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, viscosity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"] | None, conductivity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, expansion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, heating: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None, capacity: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, out_of_plane: collections.abc.Sequence[float]) -> None:
+        """
+        `reference` is the temperature without thermal stress; `out_of_plane` what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz of a plane.
+        """
     @property
     def capacity(self) -> float:
         ...
@@ -251,21 +266,32 @@ class Material3:
     def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
+    def out_of_plane(self) -> list[float]:
+        """
+        what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz
+        """
+    @property
+    def reference(self) -> float:
+        ...
+    @property
     def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"] | None:
         ...
 class Problem3:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart]) -> None:
+    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
         """
-        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta.
+        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
         """
     @property
     def conducts(self) -> bool:
         """
         Whether there is a temperature to solve for.
         """
+    @property
+    def lumped(self) -> bool:
+        ...
     @property
     def material(self) -> Material3:
         """
@@ -379,6 +405,11 @@ class Operators2:
     def inertia(self) -> petsc4py.PETSc.Mat | None:
         """
         rho (w, v), of PETSc's type MAIJ; convert('aij') has its entries
+        """
+    @property
+    def reference(self) -> petsc4py.PETSc.Vec | None:
+        """
+        m(reference temperature, v), a vector; None where that is 0
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat | None:
@@ -542,6 +573,11 @@ class Operators3:
         rho (w, v), of PETSc's type MAIJ; convert('aij') has its entries
         """
     @property
+    def reference(self) -> petsc4py.PETSc.Vec | None:
+        """
+        m(reference temperature, v), a vector; None where that is 0
+        """
+    @property
     def viscosity(self) -> petsc4py.PETSc.Mat | None:
         """
         b(w, v)
@@ -658,11 +694,14 @@ class Symmetry:
     
       positive_definite
     
+      definite_or_refused
+    
       symmetric
     
       general
     """
     __members__: typing.ClassVar[dict[str, Symmetry]]
+    definite_or_refused: typing.ClassVar[Symmetry]
     general: typing.ClassVar[Symmetry]
     positive_definite: typing.ClassVar[Symmetry]
     symmetric: typing.ClassVar[Symmetry]
@@ -1203,6 +1242,16 @@ class Stepper2:
         """
         Velocity.
         """
+    @property
+    def strained_w(self) -> petsc4py.PETSc.Vec | None:
+        """
+        Velocity likewise.
+        """
+    @property
+    def strained(self) -> petsc4py.PETSc.Vec | None:
+        """
+        Displacement but for a rigid motion, with the digits that this would take; None where the body has a support.
+        """
 class StepReport3:
     """
     What one step did.
@@ -1327,6 +1376,16 @@ class Stepper3:
         """
         Velocity.
         """
+    @property
+    def strained_w(self) -> petsc4py.PETSc.Vec | None:
+        """
+        Velocity likewise.
+        """
+    @property
+    def strained(self) -> petsc4py.PETSc.Vec | None:
+        """
+        Displacement but for a rigid motion, with the digits that this would take; None where the body has a support.
+        """
 @typing.overload
 def heat_matrix(operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
@@ -1336,6 +1395,16 @@ def heat_matrix(operators: Operators2, k: typing.SupportsFloat | typing.Supports
 def heat_matrix(operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
     M / k + D + J, cooled.
+    """
+@typing.overload
+def largest_strain(mesh: Mesh2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> float:
+    """
+    Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
+    """
+@typing.overload
+def largest_strain(mesh: Mesh3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> float:
+    """
+    Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
     """
 @typing.overload
 def momentum_matrix(layout: Layout2, problem: Problem2, operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
@@ -1370,6 +1439,16 @@ def stress(problem: Problem2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.
 def stress(problem: Problem3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]:
     """
     Cauchy stress (2.1) at the cells' centroids, (cells, d*d), from nodal u, w (nodes, d) and theta (nodes); a field the problem does not have may be empty.
+    """
+@typing.overload
+def stress_out_of_plane(problem: Problem2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.
+    """
+@typing.overload
+def stress_out_of_plane(problem: Problem3, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], w: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], theta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    sigma_zz at the cells' centroids, (cells,), of a plane; zero in space. Arrays as for stress.
     """
 compiler: str = 'g++ 12.2.0'
 petsc_version: str = '3.18.5'

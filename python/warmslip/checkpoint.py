@@ -85,6 +85,7 @@ def save(folder: Path, job: Run) -> None:
         "errors": job.errors,
         "newton_max": job.newton_max,
         "stages": job.stages,
+        "seen": job.watch.seen,
     }
     arrays = {name: values for name, values in fields.items() if values is not None}
     arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
@@ -143,6 +144,7 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
             and worst.keys() == job.worst.keys()
             and errors.keys() <= set(ESTIMATED)
             and all(type(v) is float for v in (*worst.values(), *errors.values()))
+            and job.watch.fits(record["seen"])
             and all(type(count) is int and count >= 0 for count in counts)
             and 0 < record["step"] <= job.scene.time.steps
         )
@@ -196,4 +198,5 @@ def load(folder: Path, job: Run) -> int:
     job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
     job.worst, job.errors = record["worst"], record["errors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
+    job.watch.seen |= record["seen"]
     return int(record["step"])

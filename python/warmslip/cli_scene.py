@@ -55,6 +55,8 @@ def run(
         result = warmslip.run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if rank == 0:
         typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
+        for sentence in result.summary["warnings"]:
+            console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
     if not result.right:
         sys.exit(130 if result.outcome == "interrupted" else 1)  # it has said why
 

@@ -125,12 +125,54 @@ def _materials(scene: Scene) -> Iterator[str]:
             lam, mu = table.pair(d)
             if mu < 0 or d * lam + 2 * mu < 0:
                 yield f"{key}: the tensor must not be negative; it needs mu >= 0 and {d} lambda + 2 mu >= 0"
+    yield from _couplings(scene)
     for key, heat in _heats(scene):
         k = heat.conductivity
         if not isinstance(k, list):
             k = [[k]]
         if all(len(row) == len(k) for row in k) and _negative(k):
             yield f"{key}.conductivity must not have a negative eigenvalue; heat would flow from cold to hot"
+
+
+def coupling_tables(
+    scene: Scene, region: t.RegionTable | None
+) -> tuple[t.ExpansionTable | None, t.HeatingTable | None, float]:
+    """The tables of expansion and heating that hold in the body or in a region, and the temperature without thermal stress."""
+    body, own = scene.heat, region.heat if region is not None else None
+    expansion, heating = (
+        (getattr(own, name) if own is not None else None) or (getattr(body, name) if body is not None else None)
+        for name in ("expansion", "heating")
+    )
+    for table in (expansion, body.expansion if body is not None else None):
+        if table is not None and table.reference_temperature is not None:
+            return expansion, heating, table.reference_temperature
+    return expansion, heating, 0.0
+
+
+def _couplings(scene: Scene) -> Iterator[str]:
+    """What alpha needs of the elasticity, and thermodynamic heating of the expansion, in the body and in every region."""
+    for name, region in [("", None), *scene.regions.items()]:
+        prefix = f"regions.{name}." if region is not None else ""
+        expansion, heating, reference = coupling_tables(scene, region)
+        own = region.heat if region is not None else None
+        if region is not None and region.elasticity is None and (own is None or not (own.expansion or own.heating)):
+            continue  # said of the body
+        if heating is not None and heating.thermodynamic:
+            key = f"{prefix if own is not None and own.heating else ''}heat.heating.thermodynamic"
+            if expansion is None:
+                yield f"{key}: R = -T0 M needs an M; give a table [heat.expansion]"
+            elif reference <= 0:
+                yield f"{key}: R = -T0 M needs the absolute temperature T0; give heat.expansion.reference_temperature"
+        if expansion is None or expansion.alpha is None:
+            continue
+        key = f"{prefix if own is not None and own.expansion else ''}heat.expansion.alpha"
+        elasticity = (region and region.elasticity) or scene.elasticity
+        if elasticity is None:
+            yield f"{key}: the stress of an expansion needs an elasticity; give a table [elasticity], or tensor in its place"
+        elif elasticity.tensor is not None:
+            yield f"{key}: it is for an isotropic elasticity; give tensor in its place"
+        elif scene.mesh.dim == 2 and elasticity.assumption is None:
+            yield f"{key}: lame says nothing about z; add assumption = 'plane_strain' to it, or give young and poisson"
 
 
 def _negative(matrix: list[list[float]]) -> bool:

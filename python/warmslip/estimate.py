@@ -14,6 +14,7 @@ import numpy as np
 
 from warmslip import checkpoint
 from warmslip.explain import Plan, plan
+from warmslip.foresight import before
 from warmslip.materials import cell_regions
 from warmslip.recorder import TrajectoryWriter
 from warmslip.runner import Run, finish, run
@@ -107,6 +108,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     return replace(
         found,
         suspicious=[*found.suspicious, *_bent(job)],
+        warnings=before(job.discretisation),
         fields=[*found.fields, size, *regions],
         solver=job.stepper.solver,
         setup_seconds=setup,

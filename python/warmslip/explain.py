@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from warmslip.consistency import contact_keys
+from warmslip import plausibility
+from warmslip.consistency import contact_keys, coupling_tables
 from warmslip.expressions import constant
 from warmslip.scene import Scene
-from warmslip.tables import ContactTable
+from warmslip.tables import ContactTable, ExpansionTable, HeatingTable
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Plan:
     kept: list[str] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
     suspicious: list[str] = field(default_factory=list)  # what is there, can be meant, and often is not
+    assumed: list[str] = field(default_factory=list)  # what is not said and taken for granted
+    warnings: list[str] = field(default_factory=list)  # what will solve its equations and is hardly sensible
     solver: str = ""
     setup_seconds: float = 0.0  # wall time on this machine and these ranks
     step_seconds: float = 0.0
@@ -57,12 +60,18 @@ def removable(scene: Scene) -> dict[str, str]:
     if scene.heat is not None:
         for name in ("expansion", "heating"):
             table = getattr(scene.heat, name)
-            if table is not None and _zero(table.tensor):
+            if table is not None and _no_effect(table):
                 out[f"heat.{name}"] = "the tensor is 0"
         heated = scene.heat.heating is not None and "heat.heating" not in out
         if not heated and _stays_cold(scene):
             out["heat"] = "nothing warms the body: the temperature stays 0"
     return out
+
+
+def _no_effect(coupling: ExpansionTable | HeatingTable) -> bool:
+    """Whether M or R is 0, as far as its own table says."""
+    given = [coupling.tensor, getattr(coupling, "alpha", None)]
+    return any(one is not None and _zero(one) for one in given)
 
 
 def _of_contact(contact: ContactTable) -> dict[str, str]:
@@ -156,6 +165,8 @@ def plan(scene: Scene) -> Plan:
         kept=_kept(scene),
         missing=_missing(scene),
         suspicious=_suspicious(scene),
+        assumed=_assumed(scene),
+        warnings=plausibility.of_scene(scene),
     )
 
 
@@ -210,6 +221,37 @@ def _missing(scene: Scene) -> list[str]:
     return out
 
 
+def _assumed(scene: Scene) -> list[str]:
+    """What holds although no key says so."""
+    out = []
+    for c in scene.contacts:
+        exchange = c.heat_exchange
+        if exchange is not None and exchange.conductance and c.stiffness is not None:
+            more = "; per_pressure acts only where it touches" if exchange.per_pressure else ""
+            out.append(
+                f"heat is exchanged on '{c.part}' also across an open gap, with the conductance {exchange.conductance:g}{more}"
+            )
+        elif exchange is not None and exchange.per_pressure:
+            out.append(f"heat is exchanged on '{c.part}' only where it touches")
+    for name, region in [("the body", None), *((f"region '{name}'", region) for name, region in scene.regions.items())]:
+        tables = [(region and getattr(region, key)) or getattr(scene, key) for key in ("elasticity", "viscosity")]
+        given = [table for table in tables if table is not None]
+        if scene.mesh.dim == 2 and any(table.strained for table in given):
+            expansion, *_ = coupling_tables(scene, region)
+            if any(table.tensor is not None for table in given):
+                out.append(
+                    f"{name} is in plane strain with a full tensor, which does not tell the stress along z: it is taken as 0"
+                )
+            elif expansion is not None and isinstance(expansion.tensor, list):
+                out.append(f"{name} is in plane strain: along z its expansion is taken as the mean of M_xx and M_yy")
+        elif scene.mesh.dim == 2 and given and any(table.assumption is None for table in given):
+            out.append(f"{name} has no stress along z: no assumption says plane_strain")
+        own = region.heat if region is not None else None
+        if own is not None and own.capacity is None and scene.heat is not None:
+            out.append(f"{name} has the capacity of the body, {scene.heat.capacity:g}")
+    return out
+
+
 def _suspicious(scene: Scene) -> list[str]:
     out = []
     for c in scene.contacts:
@@ -243,7 +285,9 @@ def text(found: Plan) -> str:
         ),
         *block("stays", found.kept),
         *block("not in this scene", found.missing),
+        *block("taken for granted", found.assumed),
         *block("there, and worth a second look", found.suspicious),
+        *block("would solve its equations, and is hardly sensible", found.warnings),
     ]
     if found.seconds == found.seconds and found.seconds > 0:
         out += block(

@@ -5,6 +5,8 @@ Narrower types of frozen lists are safe, which mypy cannot know.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from warmslip.tables import (
@@ -26,6 +28,7 @@ from warmslip.tables import (
 
 class FullExpansionTable(ExpansionTable):
     tensor: Matrix
+    reference_temperature: Annotated[float, Field(strict=True, ge=0, le=0)] = 0.0
 
 
 class FullHeatingTable(HeatingTable):

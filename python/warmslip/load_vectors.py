@@ -59,9 +59,14 @@ class StepData:
 
 
 class LoadVectors:
-    """The data of every step; what does not depend on time is assembled once."""
+    """The data of every step; what does not depend on time is assembled once.
 
-    def __init__(self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any) -> None:
+    `reference`, m(reference temperature, v) or None, is taken off the forces.
+    """
+
+    def __init__(
+        self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any, reference: Any = None
+    ) -> None:
         dim = scene.mesh.dim
         _refuse_unused(scene, loads)
         self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
@@ -73,9 +78,12 @@ class LoadVectors:
         quadrature = _core.LoadQuadrature2 if dim == 2 else _core.LoadQuadrature3
         rules: dict[tuple[str | None, int], Any] = {}
 
-        def rule(part: str | None, data: Data) -> Any:
-            # a constant times a P1 function is integrated exactly by one point
-            key = part, loads.points if callable(data) else 1
+        lumped = scene.heat is not None and scene.heat.capacity_matrix == "lumped"
+
+        def rule(part: str | None, data: Data, what: str) -> Any:
+            # a constant times a P1 function is integrated exactly by one point; what a lumped conductance leads in is
+            # taken at the vertices as what it leads out, 0
+            key = part, 0 if lumped and what == HEATED else loads.points if callable(data) else 1
             if key not in rules:
                 rules[key] = quadrature(layout, *key)
             return rules[key]
@@ -100,9 +108,11 @@ class LoadVectors:
             if not (moves if mechanical else conducts):
                 continue
             if of_time(data):
-                self._moving.append((mechanical, rule(part, data), data, what))
+                self._moving.append((mechanical, rule(part, data, what), data, what))
             elif callable(data) or np.any(data):
-                self._add(self._constant, mechanical, rule(part, data), data, 0.0, what)
+                self._add(self._constant, mechanical, rule(part, data, what), data, 0.0, what)
+        if reference is not None:
+            self._constant[0].axpy(-1.0, reference)
         moving = [any(mechanical == motion for mechanical, *_ in self._moving) for motion in (True, False)]
         self._present = layout.vector(dim) if moving[0] else None, layout.vector(1) if moving[1] else None
         # a support that stays where it is has no velocity; one at zero has no temperature

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core, mesh_files
+from warmslip.consistency import coupling_tables
 from warmslip.expressions import Expression
 from warmslip.laws import Watched
 from warmslip.loads import Array
 from warmslip.refinement import refined
 from warmslip.scene import Scene
 from warmslip.tables import ContactTable, IsotropicTable, MeshTable, RegionTable
-
-COUPLINGS = ("expansion", "heating")
 
 
 def of_dim(name: str, dim: int) -> Any:
@@ -30,6 +29,43 @@ def mandel(table: IsotropicTable, dim: int) -> Array:
     tensor = 2 * mu * np.eye(dim * (dim + 1) // 2)
     tensor[:dim, :dim] += lam
     return tensor
+
+
+def out_of_plane(
+    elasticity: IsotropicTable | None, viscosity: IsotropicTable | None, expansion: Array | None
+) -> tuple[float, float, float]:
+    """What tr eps(u), tr eps(w) and minus the warming are multiplied by in sigma_zz: all 0 unless in plane strain.
+
+    A Lame pair without an assumption follows the other tensor. M_zz is taken to be the mean of M_xx and M_yy, which is M where it
+    is a number. Of a full tensor sigma_zz is not known, and 0.
+    """
+    tables = [table for table in (elasticity, viscosity) if table is not None]
+    if not any(table.strained for table in tables) or any(table.tensor is not None for table in tables):
+        return 0.0, 0.0, 0.0
+    lam = [
+        table.pair(2)[0] if table is not None and table.assumption != "plane_stress" else 0.0
+        for table in (elasticity, viscosity)
+    ]
+    return lam[0], lam[1], float(np.trace(expansion)) / 2 if expansion is not None else 0.0
+
+
+def couplings(scene: Scene, region: RegionTable | None) -> tuple[Array | None, Array | None, float]:
+    """M and R of the body or of a region, (d, d), and the temperature without thermal stress; None for what is absent."""
+    d = scene.mesh.dim
+    expansion, heating, reference = coupling_tables(scene, region)
+    stress: Array | None = None
+    if expansion is not None and expansion.alpha is not None:
+        elasticity = (region and region.elasticity) or scene.elasticity
+        assert elasticity is not None
+        stress = expansion.alpha * elasticity.per_expansion(d) * np.eye(d)
+    elif expansion is not None:
+        stress = _matrix(expansion.tensor, d)
+    if heating is None:
+        return stress, None, reference
+    if heating.thermodynamic:
+        assert stress is not None
+        return stress, -reference * stress, reference
+    return stress, _matrix(heating.tensor, d), reference
 
 
 def _matrix(value: Any, dim: int) -> Array:
@@ -67,7 +103,8 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
             return getattr(region, name, None) or getattr(scene, name)
 
         inertia, heat = table("inertia"), table("heat")
-        coupling = {name: getattr(heat, name, None) or getattr(scene.heat, name, None) for name in COUPLINGS}
+        expansion, heating, reference = couplings(scene, region)
+        zz = out_of_plane(table("elasticity"), table("viscosity"), expansion)
         return of_dim("Material", d)(
             density=inertia.density if inertia is not None else 0.0,
             **{
@@ -75,8 +112,11 @@ def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:
                 for name in ("elasticity", "viscosity")
             },
             conductivity=_matrix(heat.conductivity, d) if heat is not None else None,
-            **{name: _matrix(value.tensor, d) if value is not None else None for name, value in coupling.items()},
-            capacity=heat.capacity if heat is not None else 1.0,
+            expansion=expansion,
+            heating=heating,
+            capacity=getattr(heat, "capacity", None) or (scene.heat.capacity if scene.heat is not None else 1.0),
+            reference=reference,
+            out_of_plane=zz if d == 2 else (0.0, 0.0, 0.0),
         )
 
     return [material(None), *(material(region) for region in scene.regions.values())], cell_regions(

@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from warmslip.loads import Array
-from warmslip.problem import Discretisation, von_mises
+from warmslip.problem import Discretisation
 
 BODY = ("displacement", "velocity", "temperature", "stress", "von Mises")
 
@@ -30,6 +30,8 @@ def write_vtu(
 ) -> None:
     """One state as VTU for ParaView: those of `fields` that the scene has, at the nodes, stress and von Mises stress a cell.
 
+    With the stress of a body in plane strain goes `stress zz`, that along z.
+
     Arrays are in mesh numbering, (nodes, d) and (nodes,); None for a field the scene does not have. Raises OSError when the file
     cannot be written.
     """
@@ -37,10 +39,12 @@ def write_vtu(
     cells: dict[str, Any] = {}
     if u is not None:
         stress = d.stress(u, w, theta)
-        cells = {"stress": [stress.reshape(len(stress), -1)], "von Mises": [von_mises(stress)]}
+        cells = {"stress": [stress.reshape(len(stress), -1)], "von Mises": [d.mises_of(u, w, theta)]}
+        if "stress" in fields and any(any(m.out_of_plane) for m in d.problem.materials):
+            cells["stress zz"] = [d.stress_zz(u, w, theta)]
     meshio.Mesh(
         three(np.asarray(d.mesh.nodes)),
         [("triangle" if d.dim == 2 else "tetra", np.asarray(d.mesh.cells))],
         point_data={name: three(v) for name, v in nodal.items() if v is not None and name in fields},
-        cell_data={name: v for name, v in cells.items() if name in fields},
+        cell_data={name: v for name, v in cells.items() if name in (*fields, "stress zz")},
     ).write(path)

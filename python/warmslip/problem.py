@@ -120,16 +120,35 @@ class Discretisation:
 
     def stress(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
         """Cauchy stress (2.1) at the centroids, (cells, d, d); None for a field the problem does not have."""
+        return np.asarray(_core.stress(self.problem, *self._fields(u, w, theta))).reshape(-1, self.dim, self.dim)
+
+    def stress_zz(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Stress along z of a plane at the centroids, (cells,), see `materials.out_of_plane`; 0 in plane stress, and in space."""
+        return np.asarray(_core.stress_out_of_plane(self.problem, *self._fields(u, w, theta)))
+
+    def _fields(self, u: Array | None, w: Array | None, theta: Array | None) -> tuple[Array, Array, Array]:
         none = np.empty((0, self.dim))
-        flat = _core.stress(
-            self.problem, none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
-        )
-        return np.asarray(flat).reshape(-1, self.dim, self.dim)
+        return none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
+
+    def largest_strain(self, u: Array) -> float:
+        """Largest principal strain, in size, of all cells for a nodal displacement (nodes, d); dimensionless."""
+        return _core.largest_strain(self.mesh, u)
+
+    def mises_of(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Von Mises stress of nodal fields at the centroids, (cells,); that of a plane counts the stress along z."""
+        return von_mises(self.stress(u, w, theta), self.stress_zz(u, w, theta) if self.dim == 2 else None)
+
+    def straining(self, stepper: Any) -> tuple[Any, Any, Any]:
+        """Displacement and velocity (nodes, d) but for rigid motions, which strain nothing, and temperature (nodes,). Collective.
+
+        A body without supports may move by more digits than its strain has; the core keeps the two apart.
+        """
+        u, w = stepper.strained, stepper.strained_w
+        return tuple(self.field(v) for v in (u or stepper.u, w or stepper.w, stepper.theta))  # type: ignore[return-value]
 
     def mises(self, stepper: Any) -> Array:
         """Von Mises stress of a stepper's state, (cells,). Collective."""
-        u, w, theta = (self.field(getattr(stepper, name)) for name in ("u", "w", "theta"))
-        return von_mises(self.stress(u, w, theta))
+        return self.mises_of(*self.straining(stepper))
 
 
 def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched]:
@@ -199,6 +218,7 @@ def discretise(
         clamped=list(scene.supports.displacement),
         cooled=list(scene.supports.temperature),
         contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
+        lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
     )
     layout = of_dim("Layout", d)(comm, mesh)
     surface = of_dim("ContactSurface", d)(layout, problem)
@@ -208,14 +228,15 @@ def discretise(
             raise ValueError(
                 f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
             )
-    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm)
+    operators = of_dim("Operators", d)(layout, problem)
+    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
     return Discretisation(
         scene,
         loads,
         mesh,
         problem,
         layout,
-        of_dim("Operators", d)(layout, problem),
+        operators,
         surface,
         of_dim("Norms", d)(layout),
         vectors,
@@ -232,10 +253,15 @@ def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
     return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
 
 
-def von_mises(stress: Array) -> Array:
-    """sqrt(3/2 s:s) with s the deviator of the stress, its missing row and column zero for d = 2 (plane stress): (cells,)."""
+def von_mises(stress: Array, zz: Array | None = None) -> Array:
+    """sqrt(3/2 s:s) with s the deviator of the stress (cells, d, d), as (cells,).
+
+    Of a plane, `zz` (cells,) is the stress along z, 0 unless given, and its shear stresses along z are 0.
+    """
     full = np.zeros((len(stress), 3, 3))
     d = stress.shape[1]
     full[:, :d, :d] = stress
+    if zz is not None:
+        full[:, 2, 2] = zz
     deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))

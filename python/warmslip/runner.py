@@ -21,6 +21,7 @@ from warmslip.recorder import TrajectoryWriter
 from warmslip.scene import Scene
 from warmslip.state import State
 from warmslip.trajectory import Trajectory
+from warmslip.watch import Watch
 
 Observer = Callable[[State, Any], None]
 log = logging.getLogger(__name__)
@@ -102,6 +103,7 @@ class Run:
         self.newton_max = 0
         self.stages: dict[str, int] = {}
         self.failure: dict[str, Any] | None = None
+        self.watch = Watch(self)
         log.info("%d unknowns on %d ranks; %s", self.discretisation.unknowns, self.comm.size, self.stepper.solver)
 
     @property
@@ -143,6 +145,7 @@ class Run:
                 log.info("step %d was not taken: %s", n, self.outcome)
                 return
             self.report = report
+            self.watch.step(report, n)
             for name, value in residuals(report).items():
                 self.worst[name] = worse(self.worst[name], value)
             for name, value in estimates(report).items():

@@ -91,7 +91,7 @@ class Scene(t.Table):
 
         Raises SceneError.
         """
-        data = self.resolved()
+        data = self.model_dump(mode="json", exclude_none=True, exclude_unset=True)  # what was left open stays so
         for key, value in values.items():
             _set(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
         return _build(data, type(self))
@@ -130,6 +130,10 @@ class Scene(t.Table):
             f"{key}: only constant data can be judged here, at zero on the supports; '{value}' is none"
             for key, value in self._formulas()
         ]
+        if self.heat and self.heat.expansion and self.heat.expansion.reference_temperature != 0:
+            problems.append(
+                "heat.expansion.reference_temperature: only 0 can be judged here; measure temperatures from it"
+            )
         if self.regions:
             problems.append("regions: only one material can be judged here; leave the table out")
         if len(self.contacts) != 1 or self.contacts[0].stiffness is None:
@@ -149,6 +153,9 @@ class Scene(t.Table):
         heat = data.setdefault("heat", {"conductivity": zero})
         for table in ("expansion", "heating"):
             heat.setdefault(table, {"tensor": zero})
+        if (alpha := heat["expansion"].pop("alpha", None)) is not None:
+            assert self.elasticity is not None
+            heat["expansion"]["tensor"] = alpha * self.elasticity.per_expansion(d)
         for holder, key in ((heat, "conductivity"), (heat["expansion"], "tensor"), (heat["heating"], "tensor")):
             if not isinstance(holder[key], list):
                 holder[key] = [[holder[key] if i == j else 0.0 for j in range(d)] for i in range(d)]

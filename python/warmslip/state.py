@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warmslip.loads import Array
-from warmslip.problem import Discretisation, von_mises
+from warmslip.problem import Discretisation
 
 
 class State:
@@ -41,15 +41,27 @@ class State:
         """Temperature, (nodes,); None without heat."""
         return self.discretisation.field(self._now().theta)
 
+    def _moving(self) -> Any:
+        return self._now().u
+
+    @cached_property
+    def _straining(self) -> tuple[Any, Any, Any]:
+        return self.discretisation.straining(self._now())
+
     @cached_property
     def stress(self) -> Array | None:
         """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
-        return None if self.u is None else self.discretisation.stress(self.u, self.w, self.theta)
+        return None if self._moving() is None else self.discretisation.stress(*self._straining)
+
+    @cached_property
+    def stress_zz(self) -> Array | None:
+        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
+        return None if self._moving() is None else self.discretisation.stress_zz(*self._straining)
 
     @cached_property
     def mises(self) -> Array | None:
-        """Von Mises stress of the cells, (cells,)."""
-        return None if self.stress is None else von_mises(self.stress)
+        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
+        return None if self._moving() is None else self.discretisation.mises_of(*self._straining)
 
     @cached_property
     def contact(self) -> dict[str, Array]:

@@ -43,6 +43,7 @@ def summary(job: Run) -> dict[str, Any]:
     return {
         "outcome": job.outcome,
         "failure": job.failure,
+        "warnings": job.watch.sentences(),
         "time": s.time,
         "steps": job.taken,
         "functions": job.discretisation.own,

@@ -17,7 +17,7 @@ from warmslip.export import contact_at, opened, state_number
 from warmslip.figures import run as drawings
 from warmslip.figures import style
 from warmslip.figures.run import Array, Body
-from warmslip.problem import Discretisation, von_mises
+from warmslip.problem import Discretisation
 from warmslip.scene import build
 from warmslip.state import resultants
 from warmslip.trajectory import Trajectory
@@ -82,7 +82,7 @@ def body(t: Trajectory, d: Discretisation, number: int) -> Body:
     if u is not None:
         fields |= {
             "displacement": np.linalg.norm(u, axis=1),
-            "von Mises stress": von_mises(d.stress(u, w, theta))[of_cell],
+            "von Mises stress": d.mises_of(u, w, theta)[of_cell],
         }
     if theta is not None:
         fields["temperature"] = theta

@@ -45,7 +45,13 @@ WHOLE: dict[str, Any] = {
     "inertia": {"density": 1.0},
     "elasticity": ISOTROPIC,
     "viscosity": {"lame": [1.0, 1.0]},
-    "heat": HEAT | {"source": "sin(x)"},
+    "heat": HEAT
+    | {
+        "source": "sin(x)",
+        "capacity_matrix": "lumped",
+        "expansion": {"alpha": 0.1, "reference_temperature": 2.0},
+        "heating": {"thermodynamic": True},
+    },
     "loads": {"body": [0.0, "t"], "traction": {"left": [1.0, 0.0]}, "heat_flux": {"left": 1.0}},
     "supports": {"displacement": {"top": [0.0, "t"]}, "temperature": {"top": "t"}},
     "contact": CONTACT,
@@ -74,6 +80,7 @@ HOLDS: dict[str, list[int]] = {  # which of those a key can hold
     "contact": [3],
     "supports.displacement": [3],
     "supports.temperature": [3],
+    "heat.heating.thermodynamic": [0],
 }
 SIGNED = (
     "poisson",
@@ -86,6 +93,7 @@ SIGNED = (
     "displacement",
     "velocity",
     "temperature",
+    "alpha",
 )
 
 

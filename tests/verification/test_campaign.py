@@ -23,7 +23,7 @@ EXACT = [
     *("square, staggered, gauss-2", "squares, monolithic, gauss-2", "squares, lagged, nodal"),
     *("printed, monolithic, 10.0", "consistent, lagged, 10.0", "cube, frictionless"),
 ]
-HARD = exact_cases.SAFEGUARDS | exact_cases.SEVERAL
+HARD = exact_cases.CYCLES | exact_cases.SEVERAL
 
 BASE: dict[str, Any] = {
     "mesh": {"n": 3},

@@ -39,6 +39,13 @@ Eigen::Matrix<double, nodes, nodes> mass(double volume) {
   return volume / (nodes * (nodes + 1)) * (Block::Ones() + Block::Identity());
 }
 
+/// Its row sums on the diagonal: the mass by the vertex rule.
+template <int nodes>
+Eigen::Matrix<double, nodes, nodes> lumped_mass(double volume) {
+  using Block = Eigen::Matrix<double, nodes, nodes>;
+  return volume / nodes * Block::Identity();
+}
+
 /// The scalar mass on each of d components: (w, v).
 template <int d>
 VectorBlock<d> vector_mass(const Simplex<d>& s);

@@ -19,11 +19,12 @@ struct Operators {
   MatHandle inertia;              ///< rho (w, v), one scalar matrix for all components
   MatHandle elasticity;           ///< a(u, v)
   MatHandle viscosity;            ///< b(w, v)
-  MatHandle mass;                 ///< (theta, eta), consistent, times the capacity
+  MatHandle mass;                 ///< (theta, eta) times the capacity, lumped where the problem says so
   MatHandle conductivity;         ///< d(theta, eta)
   MatHandle expansion;            ///< m(theta, v): rows v, columns theta
   MatHandle heating;              ///< e(w, eta): rows eta, columns w
-  MatHandle exchange;             ///< int k_c theta eta over Gamma_C, consistent
+  MatHandle exchange;             ///< int k_c theta eta over Gamma_C, as the mass
+  VecHandle reference;            ///< m(reference temperature, v); null where that is 0
   std::vector<PetscInt> clamped;  ///< global scalar indices with given displacement, owned by this rank
   std::vector<PetscInt> cooled;   ///< global nodes with given temperature, owned by this rank
 };
@@ -49,7 +50,7 @@ std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem);
 template <int d>
 class LoadQuadrature {
  public:
-  /// Volume when `part` is empty. `points` per direction (exact to degree 2 points - 1).
+  /// Volume when `part` is empty. `points` per direction (exact to degree 2 points - 1), 0 for the vertices.
   LoadQuadrature(const Layout<d>& layout, const std::optional<std::string>& part, int points);
 
   RealTable<d> positions() const { return positions_; }  ///< (points, d)

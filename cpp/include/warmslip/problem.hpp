@@ -11,6 +11,12 @@
 
 namespace warmslip {
 
+/// What the plane does not hold: sigma_zz = elastic tr eps(u) + viscous tr eps(w) - expansion (theta - reference). All
+/// zero in plane stress and in space.
+struct OutOfPlane {
+  double elastic = 0, viscous = 0, expansion = 0;
+};
+
 template <int d>
 struct Material {
   double density = 0;                      ///< rho; 0 leaves the motion quasistatic
@@ -20,6 +26,8 @@ struct Material {
   std::optional<Tensor2<d>> expansion;     ///< M of (2.1)
   std::optional<Tensor2<d>> heating;       ///< R of (2.4)
   double capacity = 1;                     ///< of heat, per volume and temperature
+  double reference = 0;                    ///< temperature at which expansion adds no stress
+  OutOfPlane out_of_plane{};
 };
 
 /// Quadrature of the contact law on a part: `points` = 0 is the vertex rule (nodal), n > 0 Gauss's with n points an
@@ -45,6 +53,7 @@ struct Problem {
   std::vector<std::string> clamped;  ///< parts with given displacement (2.5)
   std::vector<std::string> cooled;   ///< parts with given temperature (2.7)
   std::vector<ContactPart> contacts;
+  bool lumped = false;  ///< capacity and exchange by the vertex rule, diagonal: no new extremes on non-obtuse meshes
 
   const Material<d>& material(Index cell) const {
     return materials[regions.empty() ? 0 : static_cast<std::size_t>(regions[static_cast<std::size_t>(cell)])];
@@ -82,5 +91,14 @@ struct Problem {
 template <int d>
 RealTable<d * d> stress(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,
                         const Eigen::VectorXd& theta);
+
+/// Largest principal strain, in size, of all cells for nodal u (nodes, d); dimensionless.
+template <int d>
+double largest_strain(const Mesh<d>& mesh, const RealTable<d>& u);
+
+/// sigma_zz of every cell at its centroid, (cells), see OutOfPlane; zero for d = 3, whose stress holds it.
+template <int d>
+Eigen::VectorXd stress_out_of_plane(const Problem<d>& problem, const RealTable<d>& u, const RealTable<d>& w,
+                                    const Eigen::VectorXd& theta);
 
 }  // namespace warmslip

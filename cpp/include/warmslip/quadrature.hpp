@@ -13,4 +13,7 @@ struct Rule {
 /// n^dim points, exact for polynomials of degree 2n-1 on the simplex of dimension `dim` (1, 2 or 3).
 Rule simplex_rule(int dim, int n);
 
+/// The vertices with equal weights, exact for degree 1: what lumps a mass.
+Rule vertex_rule(int dim);
+
 }  // namespace warmslip

@@ -6,7 +6,7 @@ namespace warmslip {
 
 template <int d>
 LoadQuadrature<d>::LoadQuadrature(const Layout<d>& layout, const std::optional<std::string>& part, int points)
-    : layout_(layout), rule_(simplex_rule(part ? d - 1 : d, points)) {
+    : layout_(layout), rule_(points == 0 ? vertex_rule(part ? d - 1 : d) : simplex_rule(part ? d - 1 : d, points)) {
   const Mesh<d>& mesh = layout.mesh();
   std::vector<double> measures;
   if (part) {

@@ -40,6 +40,36 @@ VectorBlock<d> momentum(const Simplex<d>& s, const Material<d>& m, double k) {
   return block;
 }
 
+// The mass of heat on a simplex or a facet of `nodes` vertices, as the problem wants it.
+template <int nodes, int d>
+Eigen::Matrix<double, nodes, nodes> heat_mass(const Problem<d>& problem, double measure) {
+  return problem.lumped ? lumped_mass<nodes>(measure) : warmslip::mass<nodes>(measure);
+}
+
+// m(reference temperature, v): what a body at that temperature needs to be free of stress.
+template <int d>
+VecHandle reference_force(const Layout<d>& layout, const Problem<d>& problem) {
+  VecHandle v = layout.vector(d);
+  Vec form;
+  WARMSLIP_PETSC(VecGhostGetLocalForm(v, &form));
+  {
+    Values entries(form);
+    for (Eigen::Index c = 0; c < layout.cells(); ++c) {
+      const Index cell = layout.mesh_cells()[static_cast<std::size_t>(c)];
+      const Material<d>& m = problem.material(cell);
+      if (!m.expansion || m.reference == 0) continue;
+      const Eigen::Matrix<double, d*(d + 1), 1> force =
+          m.reference * coupling<d>(simplex<d>(vertices(layout.mesh(), cell)), *m.expansion).rowwise().sum();
+      for (int i = 0; i <= d; ++i)
+        (*entries).template segment<d>(layout.local_cells()(c, i) * d) += force.template segment<d>(i * d);
+    }
+  }
+  WARMSLIP_PETSC(VecGhostRestoreLocalForm(v, &form));
+  WARMSLIP_PETSC(VecGhostUpdateBegin(v, ADD_VALUES, SCATTER_REVERSE));
+  WARMSLIP_PETSC(VecGhostUpdateEnd(v, ADD_VALUES, SCATTER_REVERSE));
+  return v;
+}
+
 // Adds factor * int k_c theta eta over the facets of Gamma_C, in component `component` of `block` unknowns a node.
 template <int d>
 void add_exchange(const Layout<d>& layout, const Problem<d>& problem, double factor, int block, int component, Mat a) {
@@ -49,7 +79,7 @@ void add_exchange(const Layout<d>& layout, const Problem<d>& problem, double fac
     for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
       if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
       const RowMajor<d, d> values =
-          factor * contact.conductance * mass<d>(area_normal(layout.mesh(), facets, f).norm());
+          factor * contact.conductance * heat_mass<d>(problem, area_normal(layout.mesh(), facets, f).norm());
       std::array<PetscInt, d> unknowns;
       for (int i = 0; i < d; ++i)
         unknowns[static_cast<std::size_t>(i)] = layout.global_of(facets.nodes(f, i)) * block + component;
@@ -102,12 +132,15 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
   if (problem.moves()) clamped = fixed(layout, problem.clamped, d);
   if (!problem.conducts()) return;
   mass = assemble(layout, problem, 1, 1,
-                  [](const S& s, const M& m) { return (m.capacity * warmslip::mass<d + 1>(s.volume)).eval(); });
+                  [&](const S& s, const M& m) { return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval(); });
   conductivity =
       assemble(layout, problem, 1, 1, [](const S& s, const M& m) { return conduction<d>(s, or_zero(m.conductivity)); });
   if (has(&M::expansion))
     expansion =
         assemble(layout, problem, d, 1, [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.expansion)); });
+  if (std::any_of(problem.materials.begin(), problem.materials.end(),
+                  [](auto& m) { return m.expansion && m.reference != 0; }))
+    reference = reference_force(layout, problem);
   if (has(&M::heating))
     heating = assemble(layout, problem, 1, d,
                        [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.heating)).transpose().eval(); });
@@ -145,7 +178,8 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   MatHandle a = assemble(layout, problem, b, b, [&](const Simplex<d>& s, const Material<d>& m) {
     const VectorBlock<d> motion = momentum<d>(s, m, k);
     const MixedBlock<d> expansion = coupling<d>(s, or_zero(m.expansion)), heating = coupling<d>(s, or_zero(m.heating));
-    const ScalarBlock<d> heat = m.capacity / k * mass<d + 1>(s.volume) + conduction<d>(s, or_zero(m.conductivity));
+    const ScalarBlock<d> heat =
+        m.capacity / k * heat_mass<d + 1>(problem, s.volume) + conduction<d>(s, or_zero(m.conductivity));
     Eigen::Matrix<double, b*(d + 1), b*(d + 1)> block;
     for (int i = 0; i <= d; ++i)
       for (int j = 0; j <= d; ++j) {

@@ -42,4 +42,8 @@ Rule simplex_rule(int dim, int n) {
   return rule;
 }
 
+Rule vertex_rule(int dim) {
+  return {RealTable<Eigen::Dynamic>::Identity(dim + 1, dim + 1), Eigen::VectorXd::Constant(dim + 1, 1.0 / (dim + 1))};
+}
+
 }  // namespace warmslip

@@ -41,8 +41,9 @@ assert [name for name in READINGS if ratio[name]["u_V"] < 1] == ["isotropic"]
 # ## The sign of R
 #
 # Expansion turns heat into work, heating turns work into heat. In the sum of the balances of motion and heat they cancel if
-# R = -M, the sign that thermodynamics asks for and the reading `consistent` has. With R = M they add up. The ledger holds
-# both terms of every step; in the monolithic coupling both are taken at the new time and the statement is exact.
+# R = -M, the sign that thermodynamics asks for and the reading `consistent` has; where heat is not divided by the absolute
+# temperature T0, R is -T0 M. With R = M they add up. The ledger holds both terms of every step; in the monolithic coupling
+# both are taken at the new time and the statement is exact.
 
 # %%
 for name in ("mixed", "consistent"):

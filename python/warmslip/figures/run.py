@@ -147,7 +147,7 @@ def bodies(body: Body, factor: float) -> tuple[Figure, str]:
     said = [f"{name} {number(float(v.min()))} to {number(float(v.max()))}" for name, v in body.fields.items()]
     points = ""
     if body.dim == 2 and "von Mises stress" in body.fields:
-        points = "; the von Mises stress is that with sigma_zz = 0"
+        points = "; the von Mises stress counts that along z, 0 in plane stress"
     if len(body.points):
         points += "; contact points: " + ", ".join(
             f"{int((body.status == i).sum())} {name}" for i, (name, _) in enumerate(STATUS)

@@ -1,0 +1,248 @@
+"""What solves its equations and is hardly sensible: numbers in, sentences out, each with its number and its cure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from warmslip.consistency import contact_keys, coupling_tables
+from warmslip.expressions import constant
+from warmslip.scene import Scene
+from warmslip.tables import IsotropicTable
+
+STRAIN, SUNK, FRICTION, POINTS, IMPACT, BEYOND = 0.2, 0.01, 2.0, 4, 20, 1e-3
+KELVIN = 250.0, 400.0  # what data look like that count from absolute zero
+LOCKING = 0.45
+# tip displacement of a cantilever, 5 long and 4 bricks high, over that of beam theory: the docs have the whole table
+CANTILEVER = {2: (0.62, 0.30, 0.084, 0.051), 3: (0.59, 0.29, 0.077, 0.042)}
+RATIOS = (0.45, 0.49, 0.499, 0.4999)
+
+
+def of_scene(scene: Scene) -> list[str]:
+    """What the tables alone say before a run."""
+    return [*defaults(scene), *_idle(scene), *_rough(scene), *_absolute(scene), *_locking(scene)]
+
+
+def defaults(scene: Scene) -> Iterator[str]:
+    """Density and capacity that are 1 because nothing is said of them."""
+    tables: list[tuple[str, Any, str]] = [("inertia", scene.inertia, "density"), ("heat", scene.heat, "capacity")]
+    tables += [(f"regions.{name}.inertia", region.inertia, "density") for name, region in scene.regions.items()]
+    for key, table, what in tables:
+        if table is not None and what not in table.model_fields_set:
+            yield f"the {what} is 1 because [{key}] gives none; write {key}.{what}"
+
+
+def _numbers(scene: Scene) -> list[tuple[str, Any]]:
+    """Temperatures that a scene gives or holds, with their keys."""
+    if scene.heat is None:
+        return []
+    out: list[tuple[str, Any]] = [("initial.temperature", scene.initial.temperature)]
+    if isinstance(scene.supports.temperature, dict):
+        out += [(f"supports.temperature.{part}", value) for part, value in scene.supports.temperature.items()]
+    else:
+        out += [(f"supports.temperature.{part}", 0.0) for part in scene.supports.temperature]
+    for key, contact in contact_keys(scene):
+        exchange = contact.heat_exchange
+        if exchange is not None and (exchange.conductance or exchange.per_pressure):
+            out.append((f"{key}.heat_exchange.foundation_temperature", exchange.foundation_temperature))
+    return out
+
+
+def acts(value: Any) -> bool:
+    """Whether a datum, or one of several, is a formula or not zero."""
+    if isinstance(value, dict | list):
+        return any(map(acts, value.values() if isinstance(value, dict) else value))
+    return isinstance(value, str) or (value is not None and value != 0)
+
+
+def _idle(scene: Scene) -> Iterator[str]:
+    """A scene in which nothing happens."""
+    loads, initial = scene.loads, scene.initial
+    forces = [loads.body, loads.traction, loads.heat_flux, initial.displacement, initial.velocity, scene.supports.moved]
+    gaps = [c.gap for c in scene.contacts if c.stiffness and (isinstance(c.gap, str) or c.gap < 0)]
+    if acts(forces) or gaps or (scene.heat is not None and acts(scene.heat.source)):
+        return
+    temperatures = [value for _, value in _numbers(scene)]
+    if scene.heat is not None and scene.heat.expansion is not None and scene.moves:
+        temperatures.append(scene.heat.expansion.reference_temperature)
+    if constant(*temperatures) and len(set(temperatures)) <= 1:
+        yield (
+            "nothing acts: there is no load, no initial motion, no support that moves, no difference of temperature and no gap "
+            "below 0, and the answer is that nothing happens; give one of them"
+        )
+
+
+def _rough(scene: Scene) -> Iterator[str]:
+    for key, contact in contact_keys(scene):
+        friction = contact.friction
+        if friction is not None and friction.coefficient > FRICTION:
+            yield (
+                f"the friction coefficient of '{contact.part}' is {friction.coefficient:g}: dry solids have 0.1 to 1, and above "
+                f"{FRICTION:g} a step may have several answers; check {key}.friction.coefficient"
+            )
+
+
+def _absolute(scene: Scene) -> Iterator[str]:
+    """Data that look as if they counted from absolute zero, and what does not go with them."""
+    given = [value for key, value in _numbers(scene) if value != 0 or key != "initial.temperature"]
+    looks = bool(given) and constant(*given) and all(KELVIN[0] <= float(value) <= KELVIN[1] for value in given)
+    if scene.heat is None or not looks:
+        return
+    least, most = min(map(float, given)), max(map(float, given))
+    data = f"all temperatures lie between {least:g} and {most:g}" if most > least else f"all temperatures are {least:g}"
+    expansion, heating, reference = coupling_tables(scene, None)
+    if expansion is not None and reference == 0 and scene.moves:
+        yield (
+            f"{data}, which looks absolute, and the body is free of stress at 0: it expands as if warmed by {most:g}; give "
+            "heat.expansion.reference_temperature"
+        )
+    if expansion is None or heating is None or heating.tensor is None or expansion.tensor is None:
+        return
+    absolute = reference or (least + most) / 2
+    m, r = (
+        np.array(v) if isinstance(v, list) else v * np.eye(scene.mesh.dim) for v in (expansion.tensor, heating.tensor)
+    )
+    if not np.any(m) or abs((ratio := float((m * r).sum() / (m * m).sum())) + absolute) <= 0.2 * absolute:
+        return
+    what = "warms a stretched body" if ratio > 0 else "is that of a heat equation divided by the temperature"
+    yield (
+        f"{data}, which looks absolute, and R is {ratio:.3g} M, which {what}: thermodynamics has R = -{absolute:g} M; write "
+        "heat.heating = { thermodynamic = true }"
+    )
+
+
+def _locking(scene: Scene) -> Iterator[str]:
+    """P1 elements that cannot deform without a change of volume."""
+    if scene.mesh.file is None and scene.mesh.diagonal == "crisscross":
+        return
+    d = scene.mesh.dim
+    tables: list[tuple[str, IsotropicTable | None]] = [("elasticity", scene.elasticity)]
+    tables += [(f"regions.{name}.elasticity", region.elasticity) for name, region in scene.regions.items()]
+    for key, table in tables:
+        if table is None or table.tensor is not None or table.assumption == "plane_stress":
+            continue
+        lam, mu = table.pair(d)
+        ratio = lam / (2 * (lam + mu)) if lam + mu > 0 else 0.0
+        if ratio >= LOCKING:
+            part = np.interp(
+                -np.log10(0.5 - min(ratio, RATIOS[-1])), [-np.log10(0.5 - r) for r in RATIOS], CANTILEVER[d]
+            )
+            cure = (
+                "mesh.diagonal = 'crisscross', which does not lock"
+                if d == 2 and scene.mesh.file is None
+                else "a finer mesh"
+            )
+            yield (
+                f"{key} has a Poisson's ratio of {ratio:.5g}, at which linear elements lock: a cantilever of 4 bricks in height "
+                f"has {part:.2g} of its deflection; take {cure}, or a smaller ratio"
+            )
+
+
+def inside(part: str, start: float, later: float, size: float) -> list[str]:
+    """Of the least gap at the start and later on, length."""
+    if start < 0:
+        return [
+            f"the gap of '{part}' is {start:.3g} at its nearest point at t = 0: the body starts inside the foundation; start "
+            "with a gap of 0 or more, or give an initial displacement that fits"
+        ]
+    if later < -0.1 * size:
+        return [
+            f"the gap of '{part}' falls to {later:.3g}, {-100 * later / size:.2g} % of the body's size: the foundation moves "
+            "into where the body was; check contact.gap"
+        ]
+    return []
+
+
+def heat_start(
+    part: str, *, jump: float, share: float, step: float, sensible: float, layer: float, lumped: bool
+) -> list[str]:
+    """Of a `jump` of temperature at the start on a part, whose `share` reaches the first cell before it is resolved.
+
+    `sensible` is the least step that a consistent capacity stands, `layer` the time in which the jump leaves the first cell.
+    """
+    if step < sensible and share > 0.01 and not lumped:
+        return [
+            f"temperatures start with a jump of {jump:.3g} on '{part}', and a step of {step:.3g} is shorter than the mesh "
+            f"resolves there: temperatures overshoot their data; take steps of {sensible:.2g} or longer, a finer mesh there, or "
+            "heat.capacity_matrix = 'lumped'"
+        ]
+    if step > 10 * layer and share > 0.01:
+        return [
+            f"temperatures start with a jump of {jump:.3g} on '{part}', and a step of {step:.3g} is {step / layer:.2g} times the "
+            f"{layer:.2g} in which it leaves the first cell: the first steps are a sketch; take steps of {10 * layer:.2g} or "
+            "less where they matter"
+        ]
+    return []
+
+
+def strained(strain: float) -> list[str]:
+    """Of the largest principal strain, dimensionless."""
+    if not strain > STRAIN:
+        return []
+    return [
+        f"the largest strain is {100 * strain:.3g} %: the theory is one of small strains, good to a few %; lower the loads or "
+        "stiffen the body"
+    ]
+
+
+def sunk(penetration: float, size: float, deformation: float) -> list[str]:
+    """Of the largest penetration, the body's size and how far its points move against each other, lengths."""
+    cure = "raise contact.stiffness"
+    if penetration > SUNK * size:
+        return [
+            f"the body sinks into the foundation by {penetration:.3g}, {100 * penetration / size:.2g} % of its size; {cure}"
+        ]
+    if penetration > 0.1 * SUNK * size and penetration > 10 * deformation:
+        return [
+            f"the body sinks into the foundation by {penetration:.3g} and deforms by {deformation:.2g} only: the "
+            f"foundation is the softer of the two; {cure}"
+        ]
+    return []
+
+
+def touched(most: int, points: int, nearest: float) -> list[str]:
+    """Of how many contact points touch at most at any time, of how many there are, and how far the nearest is at the end."""
+    if points == 0 or most >= POINTS:
+        return []
+    if most == 0:
+        return [
+            f"nothing ever touches: the nearest point ends {nearest:.3g} away; lower contact.gap, or load the body towards it"
+        ]
+    return [
+        f"at most {most} of {points} contact points ever touch: pressures depend on the mesh; refine it there so that "
+        f"{POINTS} or more do"
+    ]
+
+
+def slid(part: str, slip: float, facet: float) -> list[str]:
+    """Of the longest slip on a part whose gap varies in space, and the size of its facets, lengths."""
+    if slip <= facet:
+        return []
+    return [
+        f"points of '{part}' slip by {slip:.3g}, {slip / facet:.2g} facets, and each keeps the gap of its first place; "
+        "let the foundation move in the formula of the gap instead, or keep the slip below a facet"
+    ]
+
+
+def impact(shortest: int | None) -> list[str]:
+    """Of the fewest steps of a contact that began and ended."""
+    if shortest is None or shortest >= IMPACT:
+        return []
+    return [
+        f"an impact lasts {shortest} steps: its force and rebound are damped by the steps; take {IMPACT / shortest:.2g} times as "
+        f"many, so that it lasts {IMPACT}"
+    ]
+
+
+def beyond(low: dict[str, float], high: dict[str, float], nodes: int, cure: str) -> list[str]:
+    """Of temperatures below and above what the data allow: `bound`, `value` farthest from it, `count`, `time`; empty for none."""
+    out = []
+    for found, below, least in ((low, "below", "least"), (high, "above", "most")):
+        if found:
+            out.append(
+                f"{found['count']:g} of {nodes} temperatures lie {below} {found['bound']:.4g}, the {least} that the data allow: "
+                f"{found['value']:.4g} at t = {found['time']:.3g}; {cure}"
+            )
+    return out
