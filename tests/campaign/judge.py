@@ -1,6 +1,7 @@
 """One scene: run by warmslip, solved in 80 digits, and what to call the difference.
 
     right                      ended right, and every field is the reference's to 1e-6 of its size
+    right_as_stated            ended right, and a field is not that near, but within the digits that the run states of it
     silently_wrong             ended right, and a field is not
     stopped_though_solvable    a named outcome, although doubles can hold the answer
     ill_posed_and_said         a named outcome, and one unit in the last place of the data moves the answer, or the rounding of
@@ -76,6 +77,12 @@ def run(scene: Scene) -> Ran:
     ran.digits = job.summary().get("digits", "")
     ran.seconds = time.perf_counter() - began
     return ran
+
+
+def stated(ran: Ran, field: str) -> float:
+    """The error that the run's own digits allow a field, a digit to spare; TOLERANCE where they allow less."""
+    digits = (ran.digits or {}).get({"w": "u", "force": "contact_force"}.get(field, field))
+    return TOLERANCE if digits is None else max(TOLERANCE, 10.0 ** (1 - digits))
 
 
 class Judge:
@@ -276,7 +283,8 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
         row["class"] = "right"
     else:
         near = all(errors[name] <= max(TOLERANCE, DATA * spread[name]) for name in FIELDS)
-        row["class"] = "ill_posed_unsaid" if near else "silently_wrong"
+        said = all(errors[name] <= stated(ran, name) for name in FIELDS)
+        row["class"] = "ill_posed_unsaid" if near else "right_as_stated" if said else "silently_wrong"
     left = [it.scheme.left_over(a, b, n) for n, (a, b) in enumerate(itertools.pairwise(own), 1)]
     row |= {f"left_{name}": max((one[name] for one in left), default="") for name in LEFT}
     row |= {f"error_{name}": errors[name] for name in FIELDS} | {f"spread_{name}": v for name, v in spread.items()}

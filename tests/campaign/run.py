@@ -29,10 +29,10 @@ from campaign.workers import served
 from warmslip.scene import SceneError
 
 CLASSES = (
-    *("right", "silently_wrong", "stopped_though_solvable", "ill_posed_and_said", "ill_posed_unsaid"),
+    *("right", "right_as_stated", "silently_wrong", "stopped_though_solvable", "ill_posed_and_said", "ill_posed_unsaid"),
     *("refused", "crash", "hang", "unjudged"),
 )
-WELL_POSED = ("right", "silently_wrong", "stopped_though_solvable", "crash", "hang")
+WELL_POSED = ("right", "right_as_stated", "silently_wrong", "stopped_though_solvable", "crash", "hang")
 LIMIT = 60.0  # seconds a scene may take, its judgement included
 GOAL = 98.0  # per cent of well-posed scenes that are to end right
 

@@ -39,6 +39,8 @@ struct Ledger {
   /// What the equations of the nodes leave over against the largest force (flow of heat) that acts in them: says
   /// whether the answer may be wrong, which an ill-conditioned operator makes possible in spite of round-off residuals.
   double force_defect, heat_defect;
+  double displacement_scale;  ///< a displacement that makes forces of rounding
+  double temperature_scale;   ///< a temperature that rounding of the velocity makes
   double force_scale;  ///< the largest force at a node beside its inertia: what errors of forces are compared with
 };
 
@@ -46,7 +48,7 @@ struct StepInputs {
   double k;
   Vec force, heat;                 ///< load vectors
   Vec expansion_theta, heating_w;  ///< the ones the coupling used
-  Vec coupling_theta;              ///< the temperature of the former
+  Vec coupling_theta, coupling_w;  ///< the temperature of the former and the velocity of the latter
   Eigen::VectorXd contact_force;   ///< at the points, (d points)
   Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the size of its terms
   Eigen::VectorXd foundation;      ///< theta_F at the points, where the conductance depends on the pressure
@@ -70,6 +72,9 @@ class Bookkeeper {
                        Vec external = nullptr) const;
   void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
                    Vec external = nullptr) const;
+  /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change from
+  /// node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel).
+  void add_rounding(Vec defect) const;
 
  private:
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
@@ -89,12 +94,14 @@ class Bookkeeper {
   VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;                  // hat functions at the contact points, found anew from positions
+  Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
   std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;      // a node
   double rigid_share_ = 1;
+  double stiffest_ = 0;  // largest row of the elasticity
   Point<d> centroid_;  // moments are taken about it
 };
 

@@ -134,7 +134,7 @@ class Stepper {
   StepInputs inputs(const StepLoads& loads, const ContactSolution<d>& contact) const;
   Ledger refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact);
   bool correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply);
-  void correct_heat(const StepInputs& inputs, bool apply);
+  void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
   void note(double& error, double& scale, double change, double size);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <limits>
 #include <map>
@@ -127,6 +128,10 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   cooled_.resize(clamped_.size());
   for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+  double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
+  MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
+  force_magnitudes_ = Eigen::VectorXd::Zero(layout.owned() * d);
+  heat_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
   interpolate_anew();
 }
 
@@ -317,6 +322,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       const Point<d> moved = (p1.cwiseAbs() + p0.cwiseAbs() + w_both * at(inertia_rows_)) / in.k;
       const Point<d> magnitude =
           moved + given + u * at(elastic_rows_) + w * at(viscous_rows_) + theta * at(expansion_rows_);
+      force_magnitudes_.segment<d>(i * d) =
+          clamped_[static_cast<std::size_t>(i)] ? Point<d>(Point<d>::Zero()) : magnitude;
       if (clamped_[static_cast<std::size_t>(i)]) {
         force.add(position, external - left, magnitude.maxCoeff());
         l.support_work += in.k * left.dot(way);
@@ -349,6 +356,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   // where no force is applied, inner forces of a size that rounding of u makes are none
   l.force_scale =
       most[applied] > 0 ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
+  // and displacements whose forces could at most be so small are none
+  if (stiffest_ > 0) l.displacement_scale = 1e-8 * l.force_scale / stiffest_;
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.
@@ -357,11 +366,11 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
                stored = 0.5 * dot(after.theta, after.mass_theta);
   double content = 0, content_size = 0, work = 0;
-  enum { defect, backward, acting };
-  std::array<double, 3> most{};
+  enum { defect, backward, acting, carried, stiffness };
+  std::array<double, 5> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
   const double theta = largest(after.theta), both = std::max(theta, largest(before.theta)),
-               w = std::max(largest(after.w), largest(before.w));
+               w = largest(in.coupling_w), speed = std::max(largest(after.w), largest(before.w));
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
         c(contact_heat_), values(after.theta), old(before.theta);
@@ -375,6 +384,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                                theta * at(exchange_rows_, i) + w * at(heating_rows_, i);
       content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
+      heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude;
       if (cooled_[static_cast<std::size_t>(i)]) {
         l.held += in.k * wall * (*values)[i];
       } else {
@@ -382,6 +392,8 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
         if (magnitude > std::numeric_limits<double>::min()) raise(backward, std::abs(wall) / magnitude);
         if (!std::isfinite(wall)) raise(backward, std::numeric_limits<double>::infinity());
       }
+      raise(carried, speed * at(heating_rows_, i));
+      raise(stiffness, mass_rows_[i] / in.k + conduction_rows_[i] + at(exchange_rows_, i));
       work += in.k * magnitude * (std::abs((*values)[i]) + std::abs((*old)[i]));
       raise(acting, std::max({(std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k, std::abs((*flux)[i]), given}));
     }
@@ -401,6 +413,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                                                         l.supplied, l.heating, l.friction_heating, l.held}) +
                                                 layout_.sum(work))});
   l.heat_defect = relative(most[defect], most[acting]);
+  l.temperature_scale = 1e-11 * relative(most[carried], most[stiffness]);
 }
 
 template <int d>
@@ -437,6 +450,19 @@ void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const S
   Values values(out);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
+}
+
+template <int d>
+void Bookkeeper<d>::add_rounding(Vec defect) const {
+  const Eigen::Index block = block_size(defect);
+  const Eigen::VectorXd& magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_;
+  Values values(defect);
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    for (Eigen::Index a = 0; a < block; ++a) {
+      const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
+      const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
+      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
+    }
 }
 
 template class Bookkeeper<2>;

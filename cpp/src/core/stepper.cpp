@@ -91,6 +91,7 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           monolithic() ? next_.expansion_theta : now_.expansion_theta,
           options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w,
           monolithic() ? next_.theta : now_.theta,
+          options_.coupling == Coupling::lagged ? now_.straining() : next_.straining(),
           contact.force,
           free_,
           loads.foundation};
@@ -124,8 +125,10 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   const bool monolithic = this->monolithic();
   const StepInputs inputs = this->inputs(loads, contact);
   books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
+  if (!apply) books_.add_rounding(momentum_right_);
   if (monolithic) {
     books_.heat_defect(now_, next_, inputs, heat_right_);
+    if (!apply) books_.add_rounding(heat_right_);
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
@@ -146,18 +149,19 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
   if (monolithic) {
     split(coupled_, correction_w_, correction_theta_);
-    note(errors_.theta, scales_.theta, largest_entry(correction_theta_), largest_entry(next_.theta));
+    note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
+         std::max(largest_entry(next_.theta), ledger.temperature_scale));
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
   }
   note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
-       std::max(largest_entry(next_.u), largest_entry(now_.u)));
+       std::max({largest_entry(next_.u), largest_entry(now_.u), ledger.displacement_scale}));
   if (next_.elastic_u) {
     multiply(operators_.elasticity, correction_strained_ ? correction_strained_ : correction_w_, momentum_right_);
     note(errors_.stress, scales_.stress, options_.k * largest_entry(momentum_right_), ledger.force_scale);
   }
   if (contact_)
     note(errors_.contact_force, scales_.contact_force, largest_entry(change.force),
-         std::max(largest_entry(contact.force), ledger.force_scale));
+         std::max(largest_entry(contact.force), 1e-9 * ledger.force_scale));
   if (apply) {
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
     if (!rigid_.empty()) {
@@ -169,10 +173,12 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
 }
 
 template <int d>
-void Stepper<d>::correct_heat(const StepInputs& inputs, bool apply) {
+void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  if (!apply) books_.add_rounding(heat_right_);
   solve_heat(heat_right_, heat_external_, Eigen::VectorXd::Zero(given_flow_.size()), correction_theta_);
-  note(errors_.theta, scales_.theta, largest_entry(correction_theta_), largest_entry(next_.theta));
+  note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
+       std::max(largest_entry(next_.theta), ledger.temperature_scale));
   if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
 
@@ -199,7 +205,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   }
   for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
     const double rest = warmth();
-    correct_heat(inputs(loads, contact), true);
+    correct_heat(inputs(loads, contact), ledger, true);
     products(next_);
     ledger = balance(inputs(loads, contact));
     ++cost_.refinements;
@@ -207,10 +213,10 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     warmer = errors_.theta;
     warmed = true;
   }
-  if (!measured_now()) return ledger;
+  if (!measured_now() && !refined && !warmed) return ledger;
   const int before = substitutions();
-  if (momentum_ && !refined) correct_motion(loads, ledger, contact, false);
-  if (heat_ && !warmed) correct_heat(inputs(loads, contact), false);
+  if (momentum_ && (refined || measured_now())) correct_motion(loads, ledger, contact, false);
+  if (heat_ && (warmed || measured_now())) correct_heat(inputs(loads, contact), ledger, false);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return ledger;

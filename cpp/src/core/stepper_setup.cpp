@@ -3,6 +3,19 @@
 #include "warmslip/stepper.hpp"
 
 namespace warmslip {
+namespace {
+
+double largest_diagonal(Mat a) {
+  if (!a) return 0;
+  VecHandle diagonal;
+  PetscReal largest = 0;
+  WARMSLIP_PETSC(MatCreateVecs(a, diagonal.out(), nullptr));
+  WARMSLIP_PETSC(MatGetDiagonal(a, diagonal));
+  WARMSLIP_PETSC(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return largest;
+}
+
+}  // namespace
 
 template <int d>
 Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
@@ -58,7 +71,10 @@ void Stepper<d>::take_factors() {
     }
     if (conducts) {
       const MatHandle h = heat_matrix(operators_, k);
-      constants_ = RigidMotions(layout_, 1, problem_.cooled, exchanging);
+      // a capacity and an exchange that hold the constant temperature beside the conduction need no help
+      const double storing = largest_diagonal(operators_.mass) / k + largest_diagonal(operators_.exchange);
+      if (storing < 1e-3 * largest_diagonal(operators_.conductivity))
+        constants_ = RigidMotions(layout_, 1, problem_.cooled, exchanging);
       if (!constants_.empty()) constants_.add_springs(h);
       const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
       heat_ = factor(h, apart, problem_.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,

@@ -32,6 +32,7 @@ from warmslip.figures.style import (
 
 CLASSES = {
     "right": (SKY, "right"),
+    "right_as_stated": (PALE, "right to the digits it states"),
     "stopped_though_solvable": (ORANGE, "stopped, though solvable"),
     "silently_wrong": (VERMILLION, "silently wrong"),
     "crash": (INK, "crashed"),
@@ -39,9 +40,9 @@ CLASSES = {
     "ill_posed_and_said": (GREY, "data decide nothing, and it says so"),
     "ill_posed_unsaid": (GREEN, "data decide nothing, unsaid"),
     "refused": ("#bbbbbb", "refused with a reason"),
-    "unjudged": (PALE, "the reference found nothing"),
+    "unjudged": ("#eeeeee", "the reference found nothing"),
 }
-POSED = ("right", "stopped_though_solvable", "silently_wrong", "crash", "hang")
+POSED = ("right", "right_as_stated", "stopped_though_solvable", "silently_wrong", "crash", "hang")
 # rows of the lower panel: axis of the table and its words; numbers are cut into bins of decades
 AXES = {
     "tau": "step / transit of a wave",
