@@ -29,7 +29,14 @@ from campaign.workers import served
 from warmslip.scene import SceneError
 
 CLASSES = (
-    *("right", "right_as_stated", "silently_wrong", "stopped_though_solvable", "ill_posed_and_said", "ill_posed_unsaid"),
+    *(
+        "right",
+        "right_as_stated",
+        "silently_wrong",
+        "stopped_though_solvable",
+        "ill_posed_and_said",
+        "ill_posed_unsaid",
+    ),
     *("refused", "crash", "hang", "unjudged"),
 )
 WELL_POSED = ("right", "right_as_stated", "silently_wrong", "stopped_though_solvable", "crash", "hang")

@@ -255,12 +255,18 @@ def test_a_foundation_out_of_reach_costs_no_digits(small: MakeScene) -> None:
     [
         {"contact__gap": 0.1, "contact__stiffness": 1e4},
         {"contact__gap": 0.1, "contact__stiffness": 1e10},
-        {"loads__traction": {"left": [1.4, 0.0], "right": [-0.8, 0.0]}, "contact__stiffness": 2e12, "mesh__lengths": [1e-3, 1.0]},
+        {
+            "loads__traction": {"left": [1.4, 0.0], "right": [-0.8, 0.0]},
+            "contact__stiffness": 2e12,
+            "mesh__lengths": [1e-3, 1.0],
+        },
     ],
 )
 def test_a_needle_has_the_digits_it_states(small: MakeScene, keys: dict[str, Any]) -> None:
     """Nearly all of its energy is cancelled; two factorizations agree to the digits that the summary names."""
-    scene = small("isotropic", **{"mesh__n": 8, "time__steps": 1, "time__end": 0.125, "mesh__lengths": [1e-4, 1.0]} | keys)
+    scene = small(
+        "isotropic", **{"mesh__n": 8, "time__steps": 1, "time__end": 0.125, "mesh__lengths": [1e-4, 1.0]} | keys
+    )
     one, other = warmslip.run(scene), warmslip.run(scene, backend="petsc")
     stated = one.summary["digits"]["u"]
     assert one.right and other.right and 4 < stated < 9

@@ -16,6 +16,10 @@ struct Level {
   Eigen::VectorXd contact_u, gap;             ///< u at the contact points (d points), g (points)
   Eigen::VectorXd contact_force;              ///< lambda of the step that ends here (d points)
 
+  struct {
+    double u = 0, w = 0, straining = 0, theta = 0;
+  } sizes;  ///< largest entries, of u the part that inner forces see
+
   /// The displacement and the velocity that inner forces see.
   Vec shape() const { return strained ? strained : u; }
   Vec straining() const { return strained_w ? strained_w : w; }
@@ -72,8 +76,8 @@ class Bookkeeper {
                        Vec external = nullptr) const;
   void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
                    Vec external = nullptr) const;
-  /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change from
-  /// node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel).
+  /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
+  /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel).
   void add_rounding(Vec defect) const;
 
  private:
@@ -93,7 +97,7 @@ class Bookkeeper {
   VecHandle viscous_w_, contact_force_;             // B w, E lambda
   VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
   Eigen::SparseMatrix<double, Eigen::RowMajor>
-      shape_;                  // hat functions at the contact points, found anew from positions
+      shape_;  // hat functions at the contact points, found anew from positions
   Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
@@ -102,7 +106,7 @@ class Bookkeeper {
   std::vector<bool> clamped_, cooled_;      // a node
   double rigid_share_ = 1;
   double stiffest_ = 0;  // largest row of the elasticity
-  Point<d> centroid_;  // moments are taken about it
+  Point<d> centroid_;    // moments are taken about it
 };
 
 }  // namespace warmslip

@@ -39,7 +39,7 @@ double largest_of(std::initializer_list<double> terms) {
   return largest;
 }
 
-// Sum of |entries| of every row that this rank owns.
+// Sum of |entries| of every row that this rank owns; the largest of the rows of a node.
 Eigen::VectorXd row_sizes(Mat a) {
   if (!a) return {};
   PetscInt begin, end;
@@ -52,7 +52,9 @@ Eigen::VectorXd row_sizes(Mat a) {
     for (PetscInt e = 0; e < count; ++e) sizes[row - begin] += std::abs(entries[e]);
     WARMSLIP_PETSC(MatRestoreRow(a, row, &count, nullptr, &entries));
   }
-  return sizes;
+  PetscInt block;
+  WARMSLIP_PETSC(MatGetBlockSizes(a, &block, nullptr));
+  return sizes.reshaped(block, sizes.size() / block).colwise().maxCoeff().transpose();
 }
 
 double largest(Vec v) {
@@ -113,7 +115,7 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
     const VecHandle ones = layout.vector(d), sums = layout.vector(d);
     WARMSLIP_PETSC(VecSet(ones, 1));
     multiply(operators.inertia, ones, sums);
-    inertia_rows_ = *Values(sums);
+    inertia_rows_ = (*Values(sums)).reshaped(d, layout.owned()).colwise().maxCoeff().transpose();
   }
   if (operators.viscosity) viscous_w_ = layout.vector(d);
   if (surface.points() > 0) contact_force_ = layout.vector(d);
@@ -130,7 +132,7 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
   double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
   MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
-  force_magnitudes_ = Eigen::VectorXd::Zero(layout.owned() * d);
+  force_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
   heat_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
   interpolate_anew();
 }
@@ -303,8 +305,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   enum { defect, backward, acting, applied, strained, inner };
   std::array<double, 6> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double u = std::max(largest(after.shape()), largest(before.shape())), w = largest(after.straining()),
-               w_both = std::max(largest(after.w), largest(before.w)), theta = largest(in.coupling_theta);
+  const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
+               w_both = std::max(after.sizes.w, before.sizes.w), theta = largest(in.coupling_theta);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
@@ -318,30 +320,30 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
                      elastic = at(*e1), viscous = at(*b), expansion = at(*g), way = at(*velocity);
       const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
-      const Point<d> given = load.cwiseAbs() + contact_here.cwiseAbs();
-      const Point<d> moved = (p1.cwiseAbs() + p0.cwiseAbs() + w_both * at(inertia_rows_)) / in.k;
-      const Point<d> magnitude =
-          moved + given + u * at(elastic_rows_) + w * at(viscous_rows_) + theta * at(expansion_rows_);
-      force_magnitudes_.segment<d>(i * d) =
-          clamped_[static_cast<std::size_t>(i)] ? Point<d>(Point<d>::Zero()) : magnitude;
-      if (clamped_[static_cast<std::size_t>(i)]) {
-        force.add(position, external - left, magnitude.maxCoeff());
+      const auto row = [i](const Eigen::VectorXd& rows) { return rows.size() ? rows[i] : 0; };
+      const auto size = [](const Point<d>& p) { return p.cwiseAbs().maxCoeff(); };
+      const double given = size(load) + size(contact_here), expands = size(expansion),
+                   stretches = std::max(size(elastic), size(viscous)),
+                   moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
+                   within = u * row(elastic_rows_) + w * row(viscous_rows_),
+                   magnitude = moved + given + within + theta * row(expansion_rows_);
+      const bool fixed = clamped_[static_cast<std::size_t>(i)];
+      force_magnitudes_[i] = fixed ? 0 : magnitude;
+      if (fixed) {
+        force.add(position, external - left, magnitude);
         l.support_work += in.k * left.dot(way);
       } else {
         // inner forces cancel in the sum over a body
-        force.add(position, external, Point<d>(moved + given + rigid_share_ * (magnitude - moved - given)).maxCoeff());
-        raise(defect, left.cwiseAbs().maxCoeff());
-        for (int a = 0; a < d; ++a)
-          if (magnitude[a] > std::numeric_limits<double>::min()) raise(backward, std::abs(left[a]) / magnitude[a]);
-        if (!left.allFinite()) raise(backward, std::numeric_limits<double>::infinity());
+        force.add(position, external, moved + given + rigid_share_ * (magnitude - moved - given));
+        const double rest = left.allFinite() ? size(left) : std::numeric_limits<double>::infinity();
+        raise(defect, rest);
+        if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / magnitude);
       }
-      work += magnitude.dot(Point<d>(in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()));
-      raise(applied, Point<d>(given + expansion.cwiseAbs()).maxCoeff());
-      raise(strained, std::max(elastic.cwiseAbs().maxCoeff(), viscous.cwiseAbs().maxCoeff()));
-      raise(inner, Point<d>(u * at(elastic_rows_) + w * at(viscous_rows_)).maxCoeff());
-      raise(acting,
-            std::max({moved.maxCoeff(), given.maxCoeff(), elastic.cwiseAbs().maxCoeff(), at(*e0).cwiseAbs().maxCoeff(),
-                      viscous.cwiseAbs().maxCoeff(), expansion.cwiseAbs().maxCoeff()}));
+      work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
+      raise(applied, given + expands);
+      raise(strained, stretches);
+      raise(inner, within);
+      raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
     }
   }
   const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
@@ -369,8 +371,8 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   enum { defect, backward, acting, carried, stiffness };
   std::array<double, 5> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double theta = largest(after.theta), both = std::max(theta, largest(before.theta)),
-               w = largest(in.coupling_w), speed = std::max(largest(after.w), largest(before.w));
+  const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = largest(in.coupling_w),
+               speed = std::max(after.sizes.w, before.sizes.w);
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
         c(contact_heat_), values(after.theta), old(before.theta);
@@ -461,7 +463,7 @@ void Bookkeeper<d>::add_rounding(Vec defect) const {
     for (Eigen::Index a = 0; a < block; ++a) {
       const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
       const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
-      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
+      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i];
     }
 }
 

@@ -21,6 +21,13 @@ void Stepper<d>::products(Level& level) const {
   if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
   multiply(operators_.mass, level.theta, level.mass_theta);
   if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
+  const auto size = [](Vec v) {
+    PetscReal value = 0;
+    if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+    return value;
+  };
+  level.sizes = {size(level.shape()), size(level.w), 0, size(level.theta)};
+  level.sizes.straining = level.strained_w ? size(level.strained_w) : level.sizes.w;
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
 }
 
