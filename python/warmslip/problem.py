@@ -144,7 +144,7 @@ class Discretisation:
         A body without supports may move by more digits than its strain has; the core keeps the two apart.
         """
         u, w = stepper.strained, stepper.strained_w
-        return tuple(self.field(v) for v in (u or stepper.u, w or stepper.w, stepper.theta))  # type: ignore[return-value]
+        return tuple(self.field(v) for v in (u or stepper.u, w or stepper.w, stepper.theta))
 
     def mises(self, stepper: Any) -> Array:
         """Von Mises stress of a stepper's state, (cells,). Collective."""

@@ -99,12 +99,13 @@ enum class Status : std::int8_t { open, stick, slip };
 /// What the law reads at one contact point of weight `weight` during one step of size `k`.
 template <int d>
 struct ContactPoint {
-  Point<d> normal;        ///< outward unit normal of the body
-  double weight;          ///< quadrature weight, area
-  double penetration;     ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
-  Point<d> displacement;  ///< u_{n-1}, for the size of the terms of r alone
-  double gap;             ///< g_n
-  std::size_t law = 0;    ///< which of the problem's laws holds here
+  Point<d> normal;          ///< outward unit normal of the body
+  double weight;            ///< quadrature weight, area
+  double penetration;       ///< r at the step's start with the gap of its end: u_{n-1}.nu - g_n
+  Point<d> displacement;    ///< u_{n-1}, for the size of the terms of r alone
+  double gap;               ///< g_n
+  std::size_t law = 0;      ///< which of the problem's laws holds here
+  bool prescribed = false;  ///< its motion is given, and its force sets no scale for others
 };
 
 /// A point's own compliance, which scales the rows of its residual and does not move their zeros.

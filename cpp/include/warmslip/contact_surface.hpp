@@ -24,6 +24,9 @@ class ContactSurface {
   /// Which of the problem's contact parts a point lies on.
   std::size_t contact(Eigen::Index point) const { return contacts_[static_cast<std::size_t>(point)]; }
 
+  /// Whether the displacement of all nodes about a point is prescribed.
+  bool prescribed(Eigen::Index point) const { return prescribed_[static_cast<std::size_t>(point)]; }
+
   /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d
   /// nodes).
   std::vector<PetscInt> unknowns(int block) const;
@@ -45,6 +48,7 @@ class ContactSurface {
   const Layout<d>& layout_;
   std::vector<Index> nodes_;
   std::vector<std::size_t> contacts_;
+  std::vector<bool> prescribed_;
   Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
   Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)

@@ -93,6 +93,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   }
   shape_.resize(count * d, nodes() * d);
   shape_.setFromTriplets(shape.begin(), shape.end());
+  const Eigen::VectorXd moves = shape_ * free_;
+  for (Eigen::Index i = 0; i < count; ++i) prescribed_.push_back(moves.segment<d>(i * d).isZero(0));
   scalar_shape_.resize(count, nodes());
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
 }
@@ -152,7 +154,8 @@ ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurfac
   for (const ContactPart& part : problem.contacts) out.laws.push_back(part.law.value_or(ContactLaw{}));
   for (Eigen::Index i = 0; i < surface.points(); ++i) {
     const Point<d> nu = surface.normals().row(i).transpose(), here = u.segment<d>(i * d);
-    out.points.push_back({nu, surface.weights()[i], here.dot(nu) - gap[i], here, gap[i], surface.contact(i)});
+    out.points.push_back(
+        {nu, surface.weights()[i], here.dot(nu) - gap[i], here, gap[i], surface.contact(i), surface.prescribed(i)});
   }
   return out;
 }

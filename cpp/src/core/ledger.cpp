@@ -340,6 +340,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / magnitude);
       }
       work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
+      if (fixed) continue;
       raise(applied, given + expands);
       raise(strained, stretches);
       raise(inner, within);

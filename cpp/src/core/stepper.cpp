@@ -160,8 +160,8 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     note(errors_.stress, scales_.stress, options_.k * largest_entry(momentum_right_), ledger.force_scale);
   }
   if (contact_)
-    note(errors_.contact_force, scales_.contact_force, largest_entry(change.force),
-         std::max(largest_entry(contact.force), 1e-9 * ledger.force_scale));
+    note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
+         std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
   if (apply) {
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
     if (!rigid_.empty()) {

@@ -41,6 +41,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
   double largest = 0, reach = 0, fastest = 0, widest = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
+    if (point.prescribed) continue;
     const auto at = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
                    free = problem.free.template segment<d>(at);
@@ -65,6 +66,13 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
     const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
     const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
+    if (point.prescribed) {  // its force is computed from its motion alone
+      const double size = std::max(f.norm(), bound),
+                   error = std::abs(lambda - point.weight * law.compliance.pressure(r));
+      if (!std::isfinite(error)) return unlimited;
+      if (size > 0) worst = std::max({worst, error / size, (f_tau.norm() - bound) / size});
+      continue;
+    }
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
                  away = distance(law.compliance, lambda / point.weight, r);
     const double normal = off == 0 || away == 0 ? 0 : std::min(off / largest, away / reach);
@@ -249,7 +257,8 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
-      const bool enough = solution.law_residual <= 1e-2 * options_.tolerance || best.converged;
+      const bool enough = solution.law_residual <= 1e-2 * options_.tolerance ||
+                          (best.converged && !(solution.law_residual < 0.5 * best.law_residual));
       if (!best.converged || solution.law_residual < best.law_residual) best = solution;
       best.converged = true;
       if (enough) break;
@@ -427,9 +436,8 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   const auto move = [&] {
     solution.rigid.setZero();
     if (massive)
-      solution.rigid = (give_ * rigid_.inertia)
-                           .fullPivLu()
-                           .solve(problem.rigid - rigid_.motions.transpose() * solution.force);
+      solution.rigid =
+          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.motions.transpose() * solution.force);
   };
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
