@@ -62,7 +62,7 @@ def said_by(command: str, folder: Path) -> tuple[str, int]:
 def plain(text: str) -> str:
     """Blanks are one blank, round-off and the digits that it leaves are `#`."""
     text = re.sub(r"\b\d(\.\d+)?e[-+]\d+", "#", " ".join(text.split()))
-    return re.sub(r"\b(u|theta|stress|contact force) \d+(?=, )", r"\1 #", text)
+    return re.sub(r"\b(u|theta|stress|contact force) \d+(?=[,)])", r"\1 #", text)
 
 
 def commands(block: str) -> list[tuple[str, list[str]]]:

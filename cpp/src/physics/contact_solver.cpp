@@ -258,7 +258,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
       const bool enough = solution.law_residual <= 1e-2 * options_.tolerance ||
-                          (best.converged && !(solution.law_residual < 0.5 * best.law_residual));
+                          (best.converged && !(solution.law_residual < 0.9 * best.law_residual));
       if (!best.converged || solution.law_residual < best.law_residual) best = solution;
       best.converged = true;
       if (enough) break;
