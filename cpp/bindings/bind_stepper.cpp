@@ -70,7 +70,8 @@ void bind(py::module_& m) {
           "theta", [](const S& s) { return share(s.level().theta); }, "Temperature.")
       .def_property_readonly(
           "strained", [](const S& s) { return share(s.level().strained); },
-          "Displacement but for a rigid motion, with the digits that this would take; None where the body has a support.")
+          "Displacement but for a rigid motion, with the digits that this would take; None where the body has a "
+          "support.")
       .def_property_readonly(
           "strained_w", [](const S& s) { return share(s.level().strained_w); }, "Velocity likewise.")
       .def_property_readonly("time", &S::time)
