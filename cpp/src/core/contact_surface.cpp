@@ -167,12 +167,10 @@ ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& sur
   for (Eigen::Index i = 0; i < surface.points(); ++i) {
     const ContactPart& part = problem.contacts[surface.contact(i)];
     const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
-    const double speed = (velocity - velocity.dot(nu) * nu).norm(), weight = surface.weights()[i],
-                 pressure = std::max(force.segment<d>(i * d).dot(nu), 0.0) / weight;
+    const Point<d> here = force.segment<d>(i * d), slip = velocity - velocity.dot(nu) * nu;
+    const double weight = surface.weights()[i], pressure = std::max(here.dot(nu), 0.0) / weight;
     flow.conductance[i] = weight * part.heat.per_pressure * pressure;
-    flow.friction[i] =
-        part.heat.friction_share *
-        friction_power(part.law->friction, weight * part.law->friction.bound(pressure, speed).value, speed);
+    flow.friction[i] = part.heat.friction_share * here.dot(slip);
   }
   return flow;
 }

@@ -237,12 +237,13 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
       l.contact_damping += weight * (p.energy(r0) - p.energy(r1)) - lambda * (r0 - r1);
     }
     const double speed = (w - w.dot(nu) * nu).norm(), pressure = std::max(lambda, 0.0) / weight;
-    l.friction += in.k * friction_power(law.friction, weight * law.friction.bound(pressure, speed).value, speed);
+    const double bound = weight * law.friction.bound(pressure, speed).value;
+    l.friction += in.k * friction_power(law.friction, bound, speed);
     // of the work of the force on all that its penetration is made of
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
     work_magnitude_ += std::abs(lambda) * (along(u1) + along(u0) + std::abs(after.gap[i]) + std::abs(before.gap[i]));
     // and of that along the velocity, which is what the contact leaves of the free one
-    work_magnitude_ += in.contact_force.template segment<d>(i * d).norm() * in.k *
+    work_magnitude_ += std::max(in.contact_force.template segment<d>(i * d).norm(), bound) * in.k *
                        (w.norm() + in.contact_free.template segment<d>(i * d).norm());
   }
   l.contact_change = l.contact - stored_before;
