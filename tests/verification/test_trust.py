@@ -362,6 +362,7 @@ def stiff_and_rigid(d: int) -> None:
     force = {}
     for stiffness in (1e5, 1e6, 1e7, 1e12, 1e16, "rigid"):
         job = right(base.override(**{"contact.stiffness": stiffness}))
+        assert set(job.stages) <= {"none", "newton"}, job.stages
         force[stiffness] = np.asarray(job.stepper.contact_force)
     size, rigid = np.abs(force["rigid"]).max(), force["rigid"]
     miss = {c: np.abs(f - rigid).max() / size for c, f in force.items()}
