@@ -32,13 +32,13 @@ from warmslip.figures.style import (
 
 CLASSES = {
     "right": (SKY, "right"),
-    "right_as_stated": (PALE, "right to the digits it states"),
+    "right_as_stated": (GREEN, "right to the digits it states"),
     "stopped_though_solvable": (ORANGE, "stopped, though solvable"),
     "silently_wrong": (VERMILLION, "silently wrong"),
     "crash": (INK, "crashed"),
     "hang": (PURPLE, "did not end"),
     "ill_posed_and_said": (GREY, "data decide nothing, and it says so"),
-    "ill_posed_unsaid": (GREEN, "data decide nothing, unsaid"),
+    "ill_posed_unsaid": (PALE, "data decide nothing, unsaid"),
     "refused": ("#bbbbbb", "refused with a reason"),
     "unjudged": ("#eeeeee", "the reference found nothing"),
 }
@@ -184,7 +184,8 @@ def envelope(inputs: list[Path]) -> tuple[Figure, str]:
             ax.plot([low, high], [y, y], color=SKY, lw=7, solid_capstyle="butt", zorder=2)
             for end, at in ((low, line["below"]), (high, line["above"])):
                 if at:
-                    ax.plot(end, y, "|", color=VERMILLION if at == "silently_wrong" else ORANGE, ms=11, mew=2, zorder=3)
+                    color = {"silently_wrong": VERMILLION, "right_as_stated": GREEN}.get(at, ORANGE)
+                    ax.plot(end, y, "|", color=color, ms=11, mew=2, zorder=3)
         ax.set(title=scene, xlabel=r"$\log_{10}$ of the value over the scene's own")
         grid_lines(ax)
     panels[0][0].set_yticks(range(len(names)), names)
@@ -192,10 +193,11 @@ def envelope(inputs: list[Path]) -> tuple[Figure, str]:
     handles = [
         Line2D([], [], color=SKY, lw=7, label="runs right"),
         Line2D([], [], color=PALE, lw=7, label="tried"),
+        Line2D([], [], color=GREEN, marker="|", ms=11, mew=2, ls="", label="loses digits and states how many"),
         Line2D([], [], color=ORANGE, marker="|", ms=11, mew=2, ls="", label="stops with a named outcome"),
         Line2D([], [], color=VERMILLION, marker="|", ms=11, mew=2, ls="", label="silently wrong"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5)
     whole = sum(not line["below"] and not line["above"] for line in lines)
     wrong = sum("silently_wrong" in (line["below"], line["above"]) for line in lines)
     return figure, (
