@@ -80,7 +80,6 @@ struct ContactLaw {
   NormalCompliance compliance;
   Friction friction;
 
-  FrictionBound bound(double r, double slip_speed) const { return friction.bound(compliance.pressure(r), slip_speed); }
   /// Whether the generalised derivative depends on the statuses alone.
   bool piecewise_linear() const { return compliance.linear() && friction.linear(); }
 };
