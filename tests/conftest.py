@@ -29,6 +29,7 @@ def child_environment() -> dict[str, str]:
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_rmaps_base_oversubscribe": "1",
+        "OMPI_MCA_mpi_yield_when_idle": "1",
         "OMPI_MCA_ess_singleton_isolated": "1",
         "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     }

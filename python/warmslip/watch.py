@@ -6,6 +6,7 @@ A step costs a few reads of its report. Strains are looked at when the elastic e
 
 from __future__ import annotations
 
+import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ class Watch:
     """Of one run. `seen` is all that it remembers, plain numbers that a checkpoint keeps."""
 
     def __init__(self, job: Run) -> None:
-        self._job, self._d = job, job.discretisation
+        self._job, self._d = weakref.proxy(job), job.discretisation
         self._law = any(contact.stiffness is not None for contact in job.scene.contacts)
         self._impacts = bool(self._law and job.scene.inertia is not None and job.scene.inertia.density > 0)
         self.seen: dict[str, Any] = {

@@ -6,13 +6,14 @@ import json
 import re
 import subprocess
 import sys
+import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import Command, child_environment
 
-from warmslip import Trajectory
+from warmslip import Run, Trajectory, load
 
 CASES = {
     "plane": ["paper_mixed", "mesh.n=8", "time.steps=8", "contact.heat_exchange.foundation_temperature=10"],
@@ -126,3 +127,45 @@ def test_states_and_laws_are_the_same_on_any_number_of_ranks(tmp_path: Path) -> 
         told.append(np.array(json.loads(re.findall(r"\[\[.*\]\]", result.stdout)[0])))
     assert told[0].shape == (3, 5) and (told[0][:, :4] > 0).all()
     assert told[1] == pytest.approx(told[0], rel=1e-10, abs=1e-13)
+
+
+COLLECTED_APART = """
+import gc
+from mpi4py import MPI
+import warmslip
+
+gc.disable()
+for turn in range(4):
+    job = warmslip.Run(warmslip.load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
+    for _ in job.steps():
+        pass
+    job.itself = job
+    del job
+    if MPI.COMM_WORLD.rank == turn % 2:
+        gc.collect()
+print(warmslip.load("block_3d").title)
+"""
+
+
+@pytest.mark.mpi
+def test_ranks_may_collect_a_dropped_run_at_different_times() -> None:
+    """A run in a circle of references is collected when Python likes; its solver is destroyed by all ranks together."""
+    result = subprocess.run(
+        ["mpirun", "-n", "2", sys.executable, "-c", COLLECTED_APART],
+        env=child_environment(),
+        text=True,
+        capture_output=True,
+        timeout=120,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("\n") == 2
+
+
+def test_a_dropped_run_frees_its_memory_at_once() -> None:
+    job = Run(load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
+    for _ in job.steps():
+        pass
+    dropped = weakref.ref(job)
+    del job
+    assert dropped() is None

@@ -48,7 +48,9 @@ class Layout {
   void partition(std::vector<Index>& cells, std::vector<PetscInt>& owners_of_nodes);
   void count_neighbours();
 
-  MPI_Comm comm_ = MPI_COMM_NULL;  // a duplicate of the caller's
+  // PETSc's duplicate of the caller's. With several ranks it is never given back: freeing it is collective, and ranks
+  // may destroy a layout at different times.
+  MPI_Comm comm_ = MPI_COMM_NULL;
   std::shared_ptr<const Mesh<d>> mesh_;
   IndexTable<d + 1> cells_;
   std::vector<Index> mesh_cells_, mesh_nodes_, local_of_cell_;

@@ -46,9 +46,16 @@ class Handle {
   T object_ = nullptr;
 };
 
+/// Destroys a solver. Its destruction is collective, and an owner in Python may be collected at another time on every
+/// rank: with several ranks the solver is put aside until `free_what_all_ranks_dropped`.
+PetscErrorCode destroy_together(KSP* ksp);
+
+/// Destroys the solvers that every rank has put aside (collective).
+void free_what_all_ranks_dropped(MPI_Comm comm);
+
 using VecHandle = Handle<Vec, VecDestroy>;
 using MatHandle = Handle<Mat, MatDestroy>;
-using KspHandle = Handle<KSP, KSPDestroy>;
+using KspHandle = Handle<KSP, destroy_together>;
 using IsHandle = Handle<IS, ISDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
 

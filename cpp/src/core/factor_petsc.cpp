@@ -10,6 +10,7 @@ class PetscFactor final : public Factor {
     const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(k));
     const bool counted = symmetry == Symmetry::definite_or_refused,
                cholesky = counted || symmetry == Symmetry::positive_definite;
+    free_what_all_ranks_dropped(comm);
     WARMSLIP_PETSC(KSPCreate(comm, ksp_.out()));
     WARMSLIP_PETSC(KSPSetOptionsPrefix(ksp_, (prefix + "_").c_str()));
     WARMSLIP_PETSC(KSPSetOperators(ksp_, k, k));

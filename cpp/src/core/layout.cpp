@@ -28,7 +28,7 @@ SectionHandle point_section(DM dm) {
 
 template <int d>
 Layout<d>::Layout(MPI_Comm comm, std::shared_ptr<const Mesh<d>> mesh) : mesh_(std::move(mesh)) {
-  MPI_Comm_dup(comm, &comm_);
+  WARMSLIP_PETSC(PetscCommDuplicate(comm, &comm_, nullptr));
   std::vector<PetscInt> owners;  // of local nodes; -1 is this rank
   partition(mesh_cells_, owners);
 
@@ -69,7 +69,9 @@ Layout<d>::Layout(MPI_Comm comm, std::shared_ptr<const Mesh<d>> mesh) : mesh_(st
 
 template <int d>
 Layout<d>::~Layout() {
-  if (comm_ != MPI_COMM_NULL) MPI_Comm_free(&comm_);
+  int size;
+  MPI_Comm_size(comm_, &size);
+  if (size == 1) PetscCommDestroy(&comm_);
 }
 
 // DMPlex decides which rank holds which cell and which of the sharing ranks owns a node.

@@ -1,5 +1,7 @@
 #include "warmslip/petsc.hpp"
 
+#include <petsc/private/garbagecollector.h>
+
 namespace warmslip {
 
 PetscFailure::PetscFailure(int petsc_code, const std::string& where)
@@ -8,6 +10,14 @@ PetscFailure::PetscFailure(int petsc_code, const std::string& where)
 void check(PetscErrorCode error, const char* where) {
   if (error) throw PetscFailure(static_cast<int>(error), where);
 }
+
+PetscErrorCode destroy_together(KSP* ksp) {
+  int size;
+  MPI_Comm_size(PetscObjectComm(reinterpret_cast<PetscObject>(*ksp)), &size);
+  return size == 1 ? KSPDestroy(ksp) : PetscObjectDelayedDestroy(reinterpret_cast<PetscObject*>(ksp));
+}
+
+void free_what_all_ranks_dropped(MPI_Comm comm) { WARMSLIP_PETSC(PetscGarbageCleanup(comm)); }
 
 VecHandle duplicate(Vec like) {
   VecHandle v;
