@@ -142,6 +142,13 @@ template <int d>
 PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
                           const Point<d>& force, const Point<d>& velocity);
 
+/// The velocity of a closed point as the law has it: at rest where it sticks, and as deep as its force says. What
+/// momentum leaves of the velocity `free` without contact force is `velocity`, known but for rounding of `free`: far
+/// more than the whole velocity, on a stiff foundation. A component that the law knows no better is that of `velocity`.
+template <int d>
+Point<d> settled(const ContactLaw& law, const ContactPoint<d>& point, double k, Status status, const Point<d>& force,
+                 const Point<d>& free, const Point<d>& velocity);
+
 /// How far a tangential force and a slip velocity are from the friction law at one point whose bound is `bound`
 /// (force): the least change of the force, over `forces`, or of the velocity, over `velocities`, after which the law
 /// holds.

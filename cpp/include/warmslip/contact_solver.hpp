@@ -26,6 +26,9 @@ struct ContactProblem {
   std::vector<ContactPoint<d>> points;
   Eigen::VectorXd free;     ///< (d points), velocity without contact force
   Eigen::VectorXd rigid{};  ///< (motions), load on the rigid motions that are solved for apart, see RigidCoupling
+  /// (d points), a force and the velocities under it, `rigid` being what it leaves of that load: forces near it then
+  /// have velocities without rounding of the free ones. Zero and `free` where nothing is known.
+  Eigen::VectorXd known_force{}, known_velocity{};
 
   const ContactLaw& law(std::size_t point) const { return laws[points[point].law]; }
 };
@@ -42,6 +45,7 @@ struct RigidCoupling {
 template <int d>
 struct ContactSolution {
   Eigen::VectorXd force, velocity;  ///< (d points)
+  Eigen::VectorXd added;            ///< (d points), force less the known one, without rounding of the force
   Eigen::VectorXd rigid;            ///< (motions), velocity
   std::vector<Status> status;
   bool converged = false;
@@ -76,7 +80,7 @@ class ContactSolver {
 
  private:
   struct Linearisation;
-  Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& force,
+  Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
   void factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution);

@@ -27,6 +27,11 @@ class ContactSurface {
   /// Whether the displacement of all nodes about a point is prescribed.
   bool prescribed(Eigen::Index point) const { return prescribed_[static_cast<std::size_t>(point)]; }
 
+  /// The node whose velocity is that of a point and of no other, and is not prescribed; -1 where there is none.
+  Eigen::Index own_node(Eigen::Index point) const { return own_nodes_[static_cast<std::size_t>(point)]; }
+  /// Adds nodal values, (d nodes), to a displacement-like vector.
+  void add(const Eigen::VectorXd& nodal, Vec v) const;
+
   /// Global scalar indices of the contact unknowns in a vector of `block` unknowns a node, displacement first: (d
   /// nodes).
   std::vector<PetscInt> unknowns(int block) const;
@@ -49,6 +54,7 @@ class ContactSurface {
   std::vector<Index> nodes_;
   std::vector<std::size_t> contacts_;
   std::vector<bool> prescribed_;
+  std::vector<Eigen::Index> own_nodes_;
   Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
   Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)

@@ -121,8 +121,9 @@ class Stepper {
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
   StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
-  bool solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
-                     ContactSolution<d>& solution);
+  bool solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution);
+  void react(const StepInputs& inputs, ContactSolution<d>& contact);
+  void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out);
@@ -165,6 +166,7 @@ class Stepper {
   Eigen::VectorXd rigid_load_;                   // load on the rigid motions
   Eigen::MatrixXd flow_;                         // heat that contact nodes lose by their temperatures
   Eigen::VectorXd given_flow_;                   // and what they receive whatever these are
+  ContactProblem<d> posed_;                      // the contact problem that was solved last
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_, scales_{0, 0, 0, 0};  // of the step that is being taken; largest values so far

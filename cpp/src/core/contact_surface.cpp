@@ -97,6 +97,23 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   for (Eigen::Index i = 0; i < count; ++i) prescribed_.push_back(moves.segment<d>(i * d).isZero(0));
   scalar_shape_.resize(count, nodes());
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
+
+  std::vector<int> touched(static_cast<std::size_t>(nodes()), 0);  // points that a node moves
+  for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];
+  own_nodes_.assign(static_cast<std::size_t>(count), -1);
+  for (const auto& entry : scalar_shape)
+    if (entry.value() == 1 && touched[static_cast<std::size_t>(entry.col())] == 1 && !prescribed(entry.row()))
+      own_nodes_[static_cast<std::size_t>(entry.row())] = entry.col();
+}
+
+template <int d>
+void ContactSurface<d>::add(const Eigen::VectorXd& nodal, Vec v) const {
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
+  const auto indices = unknowns(d);
+  Values own(v);
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    if (indices[i] >= begin && indices[i] < end) (*own)[indices[i] - begin] += nodal[static_cast<Eigen::Index>(i)];
 }
 
 template <int d>

@@ -132,19 +132,19 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
-  ContactSolution<d> change;
+  ContactSolution<d> change, again;
   if (contact_) {
     const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
-    const Eigen::VectorXd free = velocity + contact_->compliance() * contact.force + correction;
-    ContactSolution<d> again;
-    if (!rigid_.empty()) rigid_load_ += contact_->coupling().motions.transpose() * contact.force;
-    if (!solve_contact(loads, free, contact.force, again)) return false;
-    if (apply) free_ = free;
+    posed_.known_force = contact.force;
+    posed_.known_velocity = velocity + correction;
+    posed_.rigid = rigid_load_;
+    posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
+    if (!solve_contact(contact.force, again)) return false;
+    if (apply) free_ = posed_.free;
     change = again;
-    change.force -= contact.force;
+    change.force = again.added;
     again.iterations += contact.iterations;
     again.stage = std::max(again.stage, contact.stage);
-    if (apply) contact = std::move(again);
   }
   const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
   if (monolithic) {
@@ -152,6 +152,12 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
          std::max(largest_entry(next_.theta), ledger.temperature_scale));
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+  }
+  if (contact_) {
+    const Vec moved = momentum_right_;
+    WARMSLIP_PETSC(VecWAXPY(moved, 1, correction_w_, next_.w));
+    settle(again, moved, correction_strained_);
+    WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
   }
   note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
        std::max({largest_entry(next_.u), largest_entry(now_.u), ledger.displacement_scale}));
@@ -163,6 +169,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
          std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
   if (apply) {
+    if (contact_) contact = std::move(again);
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
     if (!rigid_.empty()) {
       WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
@@ -170,6 +177,21 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     }
   }
   return true;
+}
+
+// Takes the force of points that are held by their law from the equations of their nodes, where compliances leave it
+// only as many digits as the largest force has.
+template <int d>
+void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
+  books_.momentum_defect(now_, next_, inputs, momentum_right_);
+  const Eigen::VectorXd left = surface_.nodal_values(momentum_right_);
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Eigen::Index node = surface_.own_node(i);
+    const Status status = contact.status[static_cast<std::size_t>(i)];
+    if (node < 0 || status == Status::open) continue;
+    const Point<d> nu = surface_.normals().row(i).transpose(), rest = left.segment<d>(node * d);
+    contact.force.template segment<d>(i * d) += status == Status::stick ? rest : Point<d>(rest.dot(nu) * nu);
+  }
 }
 
 template <int d>
@@ -197,6 +219,10 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   double warmer = Errors::unknown;
   for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
     const double rest = motion(), error = errors_.largest();
+    if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
+      react(inputs(loads, contact), contact);
+      ledger = balance(complete(loads, contact));
+    }
     if (!correct_motion(loads, ledger, contact, true)) break;
     ledger = balance(complete(loads, contact));
     ++cost_.refinements;

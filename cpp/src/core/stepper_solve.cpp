@@ -90,6 +90,26 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
+// Gives the contact nodes that are also points the velocity of their law, in w; `moved` has the same change. Rounding
+// of the free velocity would else be that of a penetration far smaller.
+template <int d>
+void Stepper<d>::settle(const ContactSolution<d>& contact, Vec w, Vec moved) const {
+  const Eigen::VectorXd nodal = surface_.nodal_values(w);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(nodal.size());
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Eigen::Index node = surface_.own_node(i);
+    const auto point = static_cast<std::size_t>(i);
+    if (node < 0 || contact.status[point] == Status::open) continue;
+    const Point<d> velocity = nodal.segment<d>(node * d);
+    change.segment<d>(node * d) =
+        settled<d>(posed_.law(point), posed_.points[point], options_.k, contact.status[point],
+                   contact.force.template segment<d>(i * d), posed_.free.template segment<d>(i * d), velocity) -
+        velocity;
+  }
+  surface_.add(change, w);
+  if (moved) surface_.add(change, moved);
+}
+
 // The solution for the right-hand side of the last `reduce` and the forces of the contact, and what it has of the
 // rigid motions that are solved for apart; `strained` receives it but
 // for a rigid motion, where such are solved for apart.
@@ -104,21 +124,21 @@ Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, V
 }
 
 template <int d>
-bool Stepper<d>::solve_contact(const StepLoads& loads, const Eigen::VectorXd& free, const Eigen::VectorXd& guess,
-                               ContactSolution<d>& solution) {
+bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
-  const ContactProblem<d> problem =
-      contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free, rigid_load_);
-  solution = contact_->solve(problem, guess);
+  solution = contact_->solve(posed_, guess);
   if (solution.converged && surface_.points() > surface_.nodes())
-    share_least(problem, surface_.scalar_shape(), options_.contact.tolerance, solution);
+    share_least(posed_, surface_.scalar_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
+  MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.rigid.data(), static_cast<int>(solution.rigid.size()), MPI_DOUBLE, 0, layout_.comm());
   int found[] = {solution.converged, solution.unsupported};
   MPI_Bcast(found, 2, MPI_INT, 0, layout_.comm());
   solution.converged = found[0] != 0;
   solution.unsupported = found[1] != 0;
+  solution.status.resize(posed_.points.size(), Status::open);
+  MPI_Bcast(solution.status.data(), static_cast<int>(solution.status.size()), MPI_SIGNED_CHAR, 0, layout_.comm());
   cost_.newton_iterations += solution.iterations;
   cost_.dense_factorizations += solution.factorizations;
   return solution.converged;
@@ -137,7 +157,11 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
     if (contact_ && !rigid_.empty()) free_ += carried_ * now_.rigid;
   }
-  if (contact_ && (!in_range(free_) || !solve_contact(loads, free_, contact_force_, contact))) return false;
+  if (contact_) {
+    if (!in_range(free_)) return false;
+    posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
+    if (!solve_contact(contact_force_, contact)) return false;
+  }
   const Timed part(cost_.momentum_seconds);
   const Eigen::VectorXd motions = expand(contact, monolithic() ? coupled_ : next_.w, next_.strained_w);
   if (!rigid_.empty()) {
@@ -145,6 +169,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     rigid_.carry(now_.rigid, next_.w);
   }
   if (monolithic()) split(coupled_, next_.w, next_.theta);
+  if (contact_) settle(contact, next_.w, next_.strained_w);
   return true;
 }
 

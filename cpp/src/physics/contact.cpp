@@ -166,6 +166,20 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
 }
 
 template <int d>
+Point<d> settled(const ContactLaw& law, const ContactPoint<d>& point, double k, Status status, const Point<d>& force,
+                 const Point<d>& free, const Point<d>& velocity) {
+  const Point<d>& nu = point.normal;
+  const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
+  const double pressure = force.dot(nu) / point.weight, size = along(point.displacement) + std::abs(point.gap);
+  double across = velocity.dot(nu);
+  Point<d> slip = velocity - across * nu;
+  if (status == Status::stick && law.friction.regularisation == 0) slip.setZero();
+  if (pressure > 0 && size <= k * along(free) && !law.compliance.custom && !law.compliance.at_limit(pressure))
+    across = (law.compliance.penetration(pressure, 0) - point.penetration) / k;
+  return across * nu + slip;
+}
+
+template <int d>
 double friction_defect(const Friction& friction, double bound, const Point<d>& force, const Point<d>& slip_velocity,
                        double forces, double velocities) {
   const double speed = slip_velocity.norm();
@@ -191,6 +205,8 @@ double friction_power(const Friction& friction, double bound, double slip_speed)
 #define WARMSLIP_INSTANTIATE(d)                                                                                  \
   template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, const OwnCompliance&, \
                                         const Point<d>&, const Point<d>&);                                       \
+  template Point<d> settled<d>(const ContactLaw&, const ContactPoint<d>&, double, Status, const Point<d>&,       \
+                               const Point<d>&, const Point<d>&);                                                \
   template double friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&, double, double);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -130,7 +130,9 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
   if (!(gradient.cwiseAbs().maxCoeff() <= 0.5 * tolerance * widest)) return false;
   for (const auto& q : points) {
     auto force = solution.force.template segment<d>(q.point * d);
-    force += dual.force(q, dual.at(q, y)) - q.tangential * Point<d>(force);
+    const Point<d> change = dual.force(q, dual.at(q, y)) - q.tangential * Point<d>(force);
+    force += change;
+    solution.added.template segment<d>(q.point * d) += change;
   }
   return true;
 }

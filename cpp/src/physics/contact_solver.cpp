@@ -9,6 +9,21 @@ namespace {
 
 constexpr int few_steps = 15;  // before other scales are tried
 
+template <int d>
+const Eigen::VectorXd& known_velocity(const ContactProblem<d>& problem) {
+  return problem.known_force.size() > 0 ? problem.known_velocity : problem.free;
+}
+
+// The forces of what is added to the known ones, and back.
+template <int d>
+Eigen::VectorXd total(const ContactProblem<d>& problem, const Eigen::VectorXd& added) {
+  return problem.known_force.size() > 0 ? Eigen::VectorXd(problem.known_force + added) : added;
+}
+template <int d>
+Eigen::VectorXd beyond_known(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
+  return problem.known_force.size() > 0 ? Eigen::VectorXd(force - problem.known_force) : force;
+}
+
 // Whether statuses alone make the tangent.
 template <int d>
 bool by_status(const ContactProblem<d>& problem) {
@@ -149,16 +164,17 @@ void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisatio
 
 template <int d>
 typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
-                                                                     const Eigen::VectorXd& force,
+                                                                     const Eigen::VectorXd& added,
                                                                      const Eigen::VectorXd& rigid) const {
   Linearisation at;
-  at.velocity = problem.free;
-  at.velocity.noalias() -= compliance_ * force;
+  const Eigen::VectorXd force = total(problem, added);
+  at.velocity = known_velocity(problem);
+  at.velocity.noalias() -= compliance_ * added;
   at.value.resize(force.size() + rigid_.count());
   at.value.head(force.size()) = force;
   if (rigid_.count() > 0) {
     at.velocity.noalias() += give_ * rigid_.motions * rigid;
-    at.value.tail(rigid_.count()) = rigid_.motions.transpose() * force + give_ * rigid_.inertia * rigid - problem.rigid;
+    at.value.tail(rigid_.count()) = rigid_.motions.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
   }
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
@@ -245,16 +261,19 @@ bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<
 
 template <int d>
 bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
-  Linearisation at = linearise(problem, solution.force, solution.rigid);
+  Linearisation at = linearise(problem, solution.added, solution.rigid);
   const Eigen::Index all = compliance_.rows();
   ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
+    solution.force = total(problem, solution.added);
     // the motions that are solved for apart are linear and exact after a full step
     const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
     const double forces =
         rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
-    if (unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
+    // a correction of what is known is wanted, however little it is
+    const bool wanted = step == 0 && problem.known_force.size() > 0;
+    if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
       const bool enough = solution.law_residual <= 1e-2 * options_.tolerance ||
@@ -276,10 +295,10 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     ++solution.iterations;
     const double before = at.value.norm();
     for (double length = 1;; length /= 2) {
-      Linearisation next = linearise(problem, solution.force + length * change.head(all),
+      Linearisation next = linearise(problem, solution.added + length * change.head(all),
                                      solution.rigid + length * change.tail(rigid_.count()));
       if (!line_search || next.value.norm() <= (1 - 1e-4 * length) * before || length < 1e-4) {
-        solution.force += length * change.head(all);
+        solution.added += length * change.head(all);
         solution.rigid += length * change.tail(rigid_.count());
         at = std::move(next);
         break;
@@ -296,13 +315,14 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
 // and whoever asks which points are at rest would find it slipping.
 template <int d>
 void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
-  const Linearisation at = linearise(problem, solution.force, solution.rigid);
+  const Linearisation at = linearise(problem, solution.added, solution.rigid);
   factor(problem, at, solution);
   ContactSolution<d> finer = solution;
   const Eigen::VectorXd change = direction(at);
-  finer.force += change.head(compliance_.rows());
+  finer.added += change.head(compliance_.rows());
+  finer.force = total(problem, finer.added);
   finer.rigid += change.tail(rigid_.count());
-  const Linearisation there = linearise(problem, finer.force, finer.rigid);
+  const Linearisation there = linearise(problem, finer.added, finer.rigid);
   finer.velocity = there.velocity;
   if (!accept(problem, finer) || finer.law_residual > solution.law_residual) return;
   for (std::size_t i = 0; i < there.points.size(); ++i) finer.status[i] = there.points[i].status;
@@ -347,8 +367,12 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     }
     return out;
   };
-  Eigen::VectorXd force = solution.force, momentum = force, bounds(static_cast<Eigen::Index>(problem.points.size()));
+  Eigen::VectorXd force = total(problem, solution.added), momentum = force,
+                  bounds(static_cast<Eigen::Index>(problem.points.size()));
   Eigen::VectorXd velocity = problem.free;
+  const auto under = [&](const Eigen::VectorXd& forces) -> Eigen::VectorXd {
+    return known_velocity(problem) - compliance_ * beyond_known(problem, forces);
+  };
   const auto threshold = [&](std::size_t i) {
     const auto& point = problem.points[i];
     const auto row = static_cast<Eigen::Index>(i) * d;
@@ -360,21 +384,21 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
   double inertia = 1;
   for (int step = 0; step < options_.fixed_point_steps; ++step) {
     if (step % 20 == 0) {
-      velocity = problem.free - compliance_ * force;
+      velocity = under(force);
       for (std::size_t i = 0; i < problem.points.size(); ++i) bounds[static_cast<Eigen::Index>(i)] = threshold(i);
       momentum = force;
       inertia = 1;
     }
-    const Eigen::VectorXd next = prox(momentum + rate * (problem.free - compliance_ * momentum), bounds);
+    const Eigen::VectorXd next = prox(momentum + rate * under(momentum), bounds);
     if (!next.allFinite()) return false;
     const double stronger = (1 + std::sqrt(1 + 4 * inertia * inertia)) / 2;
     momentum = next + (inertia - 1) / stronger * (next - force);
     force = next;
     inertia = stronger;
     if (step % 200 == 199) {
-      solution.force = force;
+      solution.added = beyond_known(problem, force);
       if (newton(problem, true, solution)) return true;
-      solution.force = force;
+      solution.added = beyond_known(problem, force);
       if (newton(problem, false, solution)) return true;
     }
   }
@@ -414,7 +438,8 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
     const Eigen::FullPivLU<Eigen::MatrixXd> lu(by_force - by_velocity * compliance_);
     solution.force = lu.solve(right - by_velocity * problem.free);
     if (!solution.force.allFinite()) continue;
-    const Linearisation at = linearise(problem, solution.force, solution.rigid);
+    solution.added = beyond_known(problem, solution.force);
+    const Linearisation at = linearise(problem, solution.added, solution.rigid);
     solution.velocity = at.velocity;
     if (!accept(problem, solution)) continue;
     solution.status.clear();
@@ -427,7 +452,10 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
 template <int d>
 ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
   ContactSolution<d> solution;
+  const Eigen::VectorXd guess = beyond_known(problem, force),
+                        none = beyond_known<d>(problem, Eigen::VectorXd::Zero(force.size()));
   solution.force = force;
+  solution.added = guess;
   solution.velocity = problem.free;
   solution.rigid = Eigen::VectorXd::Zero(rigid_.count());
   if (!problem.free.allFinite()) return solution;
@@ -437,13 +465,13 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     solution.rigid.setZero();
     if (massive)
       solution.rigid =
-          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.motions.transpose() * solution.force);
+          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.motions.transpose() * solution.added);
   };
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
     solution.stage = stage;
     solution.converged = method();
-    if (!solution.converged) solution.force = force;
+    if (!solution.converged) solution.added = guess;
   };
   // a body that lies on the foundation gives way by its deformation, one that hits it as a whole
   const auto moving = [&](bool carries, int steps) {
@@ -464,21 +492,22 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   if (massive)
     for (const auto& [carries, anew] : {std::pair{true, false}, std::pair{true, true}, std::pair{false, true}})
       attempt(Stage::restart, [&, carries = carries, anew = anew] {
-        if (anew) solution.force.setZero();
+        if (anew) solution.added = none;
         return moving(carries, options_.newton_steps);
       });
   if (rigid_.count() > 0)  // a body that only contact holds: again with all points pressed
     attempt(Stage::restart, [&] {
       solution.rigid.setZero();
+      Eigen::VectorXd pressed(force.size());
       const double share = problem.rigid.cwiseAbs().maxCoeff() / static_cast<double>(problem.points.size());
       for (std::size_t i = 0; i < problem.points.size(); ++i) {
         const ContactPoint<d>& point = problem.points[i];
         const auto row = static_cast<Eigen::Index>(i) * d;
         const double give = own(problem, i).normal,
                      r = point.penetration + problem.step * problem.free.template segment<d>(row).dot(point.normal);
-        solution.force.template segment<d>(row) =
-            (share + (give > 0 ? 2 * std::max(-r, 0.0) / give : 0.0)) * point.normal;
+        pressed.template segment<d>(row) = (share + (give > 0 ? 2 * std::max(-r, 0.0) / give : 0.0)) * point.normal;
       }
+      solution.added = beyond_known(problem, pressed);
       return newton(problem, true, solution);
     });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
@@ -487,7 +516,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     attempt(Stage::restart, [&] {
       boldness_ = boldness;
       factored_.clear();
-      solution.force.setZero();
+      solution.added = none;
       move();
       const bool found = newton(problem, true, solution);
       if (boldness_ != 1) factored_.clear();
