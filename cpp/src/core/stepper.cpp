@@ -184,13 +184,15 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
 template <int d>
 void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
   books_.momentum_defect(now_, next_, inputs, momentum_right_);
-  const Eigen::VectorXd left = surface_.nodal_values(momentum_right_);
+  const Eigen::VectorXd left = surface_.nodal_values(momentum_right_), velocities = surface_.nodal_values(next_.w);
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Eigen::Index node = surface_.own_node(i);
     const Status status = contact.status[static_cast<std::size_t>(i)];
     if (node < 0 || status == Status::open) continue;
-    const Point<d> nu = surface_.normals().row(i).transpose(), rest = left.segment<d>(node * d);
-    contact.force.template segment<d>(i * d) += status == Status::stick ? rest : Point<d>(rest.dot(nu) * nu);
+    const Point<d> nu = surface_.normals().row(i).transpose(), rest = left.segment<d>(node * d),
+                   velocity = velocities.segment<d>(node * d), slip = velocity - velocity.dot(nu) * nu;
+    const bool rests = status == Status::stick && slip.norm() <= 1e-15 * velocity.norm();
+    contact.force.template segment<d>(i * d) += rests ? rest : Point<d>(rest.dot(nu) * nu);
   }
 }
 

@@ -166,7 +166,8 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
   const Eigen::VectorXd motions = expand(contact, monolithic() ? coupled_ : next_.w, next_.strained_w);
   if (!rigid_.empty()) {
     next_.rigid = now_.rigid + motions;
-    rigid_.carry(now_.rigid, next_.w);
+    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));  // anew: a body that comes to rest has its two motions cancel
+    rigid_.carry(next_.rigid, next_.w);
   }
   if (monolithic()) split(coupled_, next_.w, next_.theta);
   if (contact_) settle(contact, next_.w, next_.strained_w);

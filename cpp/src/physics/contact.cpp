@@ -173,7 +173,8 @@ Point<d> settled(const ContactLaw& law, const ContactPoint<d>& point, double k, 
   const double pressure = force.dot(nu) / point.weight, size = along(point.displacement) + std::abs(point.gap);
   double across = velocity.dot(nu);
   Point<d> slip = velocity - across * nu;
-  if (status == Status::stick && law.friction.regularisation == 0) slip.setZero();
+  const bool rests = law.friction.regularisation == 0 && slip.norm() <= 1e-9 * free.norm();
+  if (status == Status::stick && rests) slip.setZero();
   if (pressure > 0 && size <= k * along(free) && !law.compliance.custom && !law.compliance.at_limit(pressure))
     across = (law.compliance.penetration(pressure, 0) - point.penetration) / k;
   return across * nu + slip;
