@@ -54,13 +54,13 @@ void bind(py::module_& m) {
       .def(
           "advance",
           [](S& s, const Maybe& force, const Maybe& heat, const Eigen::VectorXd& gap, const Maybe& velocity,
-             const Maybe& temperature, const Eigen::VectorXd& foundation) {
+             const Maybe& temperature, const Eigen::VectorXd& foundation, bool measured) {
             return s.advance({force.value_or(nullptr), heat.value_or(nullptr), gap, velocity.value_or(nullptr),
-                              temperature.value_or(nullptr), foundation});
+                              temperature.value_or(nullptr), foundation, measured});
           },
           py::arg("force"), py::arg("heat"), py::arg("gap"), py::arg("support_velocity") = py::none(),
           py::arg("support_temperature") = py::none(), py::arg("foundation") = Eigen::VectorXd(),
-          "One step; the state stays when the outcome is not right. See StepLoads.")
+          py::arg("measured") = false, "One step; the state stays when the outcome is not right. See StepLoads.")
       .def_property_readonly(
           "u", [](const S& s) { return share(s.level().u); },
           "Displacement. The vectors change owner at every step: ask again.")

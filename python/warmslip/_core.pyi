@@ -1179,7 +1179,7 @@ class Stepper2:
     """
     def __init__(self, layout: Layout2, problem: Problem2, operators: Operators2, surface: ContactSurface2, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...) -> StepReport2:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport2:
         """
         One step; the state stays when the outcome is not right. See StepLoads.
         """
@@ -1313,7 +1313,7 @@ class Stepper3:
     """
     def __init__(self, layout: Layout3, problem: Problem3, operators: Operators3, surface: ContactSurface3, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...) -> StepReport3:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport3:
         """
         One step; the state stays when the outcome is not right. See StepLoads.
         """

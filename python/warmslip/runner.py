@@ -130,7 +130,7 @@ class Run:
             for law in self.discretisation.laws:
                 for function in law.functions:
                     function.forget()
-            report = self.stepper.advance(*loads)
+            report = self.stepper.advance(*loads, measured=n == self.scene.time.steps)
             self.newton_max = max(self.newton_max, report.newton_iterations)
             self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
             if report.outcome != _core.Outcome.right:

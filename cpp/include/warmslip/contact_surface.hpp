@@ -74,9 +74,10 @@ struct ContactFlow {
   Eigen::VectorXd conductance;  ///< omega per_pressure p_nu
   Eigen::VectorXd friction;     ///< share of the frictional power, into the body
 };
-/// From the forces at the points and their velocities, (d points).
+/// From the forces at the points and their velocities, (d points); a slip that is rounding of the velocities `free`
+/// without contact makes no heat.
 template <int d>
 ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& force,
-                         const Eigen::VectorXd& w);
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& free);
 
 }  // namespace warmslip

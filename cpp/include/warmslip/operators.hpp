@@ -91,4 +91,12 @@ class Norms {
   std::vector<Simplex<d>> cells_;
 };
 
+/// The largest |A eps(u) + B eps(w)| of a cell (Frobenius norm) for given u and w, null where there is none, and the
+/// largest that fields of these sizes could have (collective).
+struct StressSize {
+  double largest = 0, possible = 0;
+};
+template <int d>
+StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w);
+
 }  // namespace warmslip

@@ -33,13 +33,13 @@ struct StepperOptions {
   int passes = 6;                 ///< of it at most, while they help
   double identity_bound = 1e-10;  ///< a step whose balances leave more is not right, see Ledger::energy_residual
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
-  int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on
+  int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on, and in
+                                  ///< steps that touch the foundation after one that did not
 };
 
 /// Estimated relative errors of the fields of a step, from what a step of iterative refinement changes in them (contact
-/// included), against the largest value of the field so far and, for stresses (as nodal forces) and contact forces, the
-/// largest force that acts; nan where the field is absent or was not measured. The digits are minus their decimal
-/// logarithms.
+/// included), against the largest value of the field so far; nan where the field is absent or was not measured. The
+/// digits are minus their decimal logarithms.
 struct Errors {
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   double u = unknown, theta = unknown, stress = unknown, contact_force = unknown;
@@ -56,6 +56,7 @@ struct StepLoads {
   /// temperature; null: zero.
   Vec support_velocity = nullptr, support_temperature = nullptr;
   Eigen::VectorXd foundation{};  ///< theta_F (points), where the conductance depends on the pressure
+  bool measured = false;         ///< digits are estimated in this step whatever its number
 };
 
 template <int d>
@@ -129,6 +130,7 @@ class Stepper {
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out);
   void take_flow(const StepLoads& loads);
   Ledger balance(const StepInputs& inputs);
+  Errors weighed() const;
   Outcome judge(const Ledger& ledger) const;
   std::string why(Outcome outcome, const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
@@ -142,7 +144,7 @@ class Stepper {
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
   bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
   bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
-  bool measured_now() const;
+  bool measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const;
   bool in_range(const Eigen::VectorXd& values) const;
   int substitutions() const;
 
@@ -170,6 +172,7 @@ class Stepper {
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_, scales_{0, 0, 0, 0};  // of the step that is being taken; largest values so far
+  double grazing_ = 1;                  // the contact force over a ten thousandth of the largest force, at most 1
   double time_ = 0;
   Cost cost_;
 };

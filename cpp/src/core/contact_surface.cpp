@@ -179,7 +179,8 @@ ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurfac
 
 template <int d>
 ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& force,
-                         const Eigen::VectorXd& w) {
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& free) {
+  const double rest = free.size() ? 1e-12 * free.cwiseAbs().maxCoeff() : 0;
   ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
   for (Eigen::Index i = 0; i < surface.points(); ++i) {
     const ContactPart& part = problem.contacts[surface.contact(i)];
@@ -187,7 +188,7 @@ ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& sur
     const Point<d> here = force.segment<d>(i * d), slip = velocity - velocity.dot(nu) * nu;
     const double weight = surface.weights()[i], pressure = std::max(here.dot(nu), 0.0) / weight;
     flow.conductance[i] = weight * part.heat.per_pressure * pressure;
-    flow.friction[i] = part.heat.friction_share * here.dot(slip);
+    flow.friction[i] = slip.norm() > rest ? part.heat.friction_share * here.dot(slip) : 0;
   }
   return flow;
 }
@@ -198,7 +199,7 @@ ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& sur
                                                 const Eigen::VectorXd&, const Eigen::VectorXd&, Eigen::VectorXd, \
                                                 Eigen::VectorXd);                                                \
   template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&,      \
-                                       const Eigen::VectorXd&);
+                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

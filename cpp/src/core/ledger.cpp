@@ -260,12 +260,13 @@ template <int d>
 void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const Eigen::VectorXd& w, Ledger& l) {
   const Eigen::VectorXd theta = at_points(after.theta);
   Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points());
+  const double rest = 1e-12 * in.contact_free.cwiseAbs().maxCoeff();  // a slip below is rounding
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const ContactPart& part = problem_.contacts[surface_.contact(i)];
     const Point<d> nu = surface_.normals().row(i).transpose(), velocity = w.template segment<d>(i * d),
                    slip = velocity - velocity.dot(nu) * nu, force = in.contact_force.template segment<d>(i * d);
     const double conducted = part.heat.per_pressure * std::max(force.dot(nu), 0.0) * (theta[i] - in.foundation[i]),
-                 made = part.heat.friction_share * force.dot(slip);
+                 made = slip.norm() > rest ? part.heat.friction_share * force.dot(slip) : 0;
     l.exchanged += in.k * conducted * theta[i];
     l.friction_heating += in.k * made * theta[i];
     leaving[i] = conducted - made;

@@ -163,8 +163,40 @@ double Norms<d>::v(Vec v) const {
   return std::sqrt(layout_.sum(total));
 }
 
-#define WARMSLIP_INSTANTIATE(d)     \
-  template class LoadQuadrature<d>; \
+template <int d>
+StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w) {
+  const Eigen::VectorXd local_u = u ? layout.local(u) : Eigen::VectorXd(), local_w = w ? layout.local(w) : local_u;
+  const auto size = [](const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0.0; };
+  const double size_u = size(local_u), size_w = w ? size(local_w) : 0;
+  double found[] = {0, 0};
+  for (Eigen::Index c = 0; c < layout.cells(); ++c) {
+    const Index cell = layout.mesh_cells()[static_cast<std::size_t>(c)];
+    const Material<d>& material = problem.material(cell);
+    const StrainMatrix<d> b = strain_matrix<d>(simplex<d>(vertices(*problem.mesh, cell)));
+    const auto strain = [&](const Eigen::VectorXd& local) -> Mandel<d> {
+      Eigen::Matrix<double, d*(d + 1), 1> nodal;
+      for (int i = 0; i <= d; ++i) nodal.template segment<d>(i * d) = local.segment<d>(layout.local_cells()(c, i) * d);
+      return b * nodal;
+    };
+    Mandel<d> stress = Mandel<d>::Zero();
+    double possible = 0;
+    const auto add = [&](const auto& tensor, Vec v, const Eigen::VectorXd& local, double at_most) {
+      if (!tensor || !v) return;
+      stress += *tensor * strain(local);
+      possible += tensor->norm() * b.norm() * at_most;
+    };
+    add(material.elasticity, u, local_u, size_u);
+    add(material.viscosity, w, local_w, size_w);
+    found[0] = std::max(found[0], stress.norm());
+    found[1] = std::max(found[1], possible);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, found, 2, MPI_DOUBLE, MPI_MAX, layout.comm());
+  return {found[0], found[1]};
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                          \
+  template StressSize stress_size<d>(const Layout<d>&, const Problem<d>&, Vec u, Vec w); \
+  template class LoadQuadrature<d>;                                                      \
   template class Norms<d>;
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -161,13 +161,20 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   }
   note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
        std::max({largest_entry(next_.u), largest_entry(now_.u), ledger.displacement_scale}));
-  if (next_.elastic_u) {
-    multiply(operators_.elasticity, correction_strained_ ? correction_strained_ : correction_w_, momentum_right_);
-    note(errors_.stress, scales_.stress, options_.k * largest_entry(momentum_right_), ledger.force_scale);
+  if (next_.elastic_u || operators_.viscosity) {
+    const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
+    WARMSLIP_PETSC(VecCopy(change_w, change_u));
+    WARMSLIP_PETSC(VecScale(change_u, options_.k));
+    const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
+    note(errors_.stress, scales_.stress, stress_size(layout_, problem_, change_u, change_w).largest,
+         std::max(there.largest, 1e-8 * there.possible));
   }
-  if (contact_)
+  if (contact_) {
+    const double here = largest_entry(surface_.to_nodes(contact.force));
     note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
-         std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
+         std::max(here, 1e-9 * ledger.force_scale));
+    grazing_ = std::min(1.0, 1e4 * scales_.contact_force / ledger.force_scale);
+  }
   if (apply) {
     if (contact_) contact = std::move(again);
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
@@ -241,10 +248,11 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     warmer = errors_.theta;
     warmed = true;
   }
-  if (!measured_now() && !refined && !warmed) return ledger;
+  const bool wanted = measured_now(loads, contact);
+  if (!wanted && !refined && !warmed) return ledger;
   const int before = substitutions();
-  if (momentum_ && (refined || measured_now())) correct_motion(loads, ledger, contact, false);
-  if (heat_ && (warmed || measured_now())) correct_heat(inputs(loads, contact), ledger, false);
+  if (momentum_ && (refined || wanted)) correct_motion(loads, ledger, contact, false);
+  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return ledger;
@@ -253,7 +261,8 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
 // Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run
 // that goes on measures the same ones.
 template <int d>
-bool Stepper<d>::measured_now() const {
+bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
+  if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
   for (double step = 1, n = std::round(time_ / options_.k) + 1; step <= n; step *= options_.measured_steps)
     if (step == n) return true;
   return false;
@@ -265,6 +274,14 @@ Ledger Stepper<d>::balance(const StepInputs& inputs) {
   return books_.close(now_, next_, inputs);
 }
 
+// The errors that may end a run: that of a contact that hardly touches is seen beside the other forces.
+template <int d>
+Errors Stepper<d>::weighed() const {
+  Errors out = errors_;
+  out.contact_force *= grazing_;
+  return out;
+}
+
 // Only a step that closes its books becomes the state.
 template <int d>
 Outcome Stepper<d>::judge(const Ledger& l) const {
@@ -274,7 +291,7 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
   const bool closed =
       l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
   if (!closed) return Outcome::identity_violated;
-  return errors_.largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
+  return weighed().largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
 }
 
 // What a step that is not right is told of.
@@ -288,8 +305,8 @@ std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
       return beyond_doubles;
     case Outcome::precision_lost:
       for (const auto& [name, error] :
-           {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta},
-            std::pair{"the elastic forces", errors_.stress}, std::pair{"the contact force", errors_.contact_force}})
+           {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta}, std::pair{"the stress", errors_.stress},
+            std::pair{"the contact force", weighed().contact_force}})
         if (error > options_.error_bound) list(name);
       return "fewer than four digits of " + names +
              " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for "
@@ -331,6 +348,7 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   const Timed timed(cost_.step_seconds);
   const int before = substitutions();
   errors_ = {};
+  grazing_ = 1;
   ContactSolution<d> contact;
   if (momentum_ && !solve_motion(loads, contact)) {
     const bool finite = in_range(free_);

@@ -180,7 +180,7 @@ template <int d>
 void Stepper<d>::take_flow(const StepLoads& loads) {
   const auto& shape = surface_.scalar_shape();
   const ContactFlow flow =
-      contact_flow(problem_, surface_, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)));
+      contact_flow(problem_, surface_, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)), free_);
   flow_ = shape.transpose() * flow.conductance.asDiagonal() * shape;
   given_flow_ = shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation) + flow.friction).eval();
   for (Eigen::Index i = 0; i < given_flow_.size(); ++i)
