@@ -216,6 +216,16 @@ def touched(most: int, points: int, nearest: float) -> list[str]:
     ]
 
 
+def grazing(error: float) -> list[str]:
+    """Of the estimated relative error of the contact force, dimensionless."""
+    if not error > 1e-4:
+        return []
+    return [
+        f"the contact force has {max(0, int(-np.log10(error)))} digits, fewer than the four of other fields: it is a small "
+        "rest of larger forces; press the body harder where it matters"
+    ]
+
+
 def slid(part: str, slip: float, facet: float) -> list[str]:
     """Of the longest slip on a part whose gap varies in space, and the size of its facets, lengths."""
     if slip <= facet:

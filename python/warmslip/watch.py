@@ -174,4 +174,5 @@ class Watch:
             if here.any() and np.ptp(gap[of_part == i]) > 1e-12 * size(d):
                 facet = float(weights[of_part == i].max()) ** (1 / (d.dim - 1))
                 out += say.slid(d.scene.contacts[i].part, float(slip[here].max()), facet)
+        out += say.grazing(self._job.errors.get("contact_force", 0.0))
         return out + say.impact(seen["shortest"])

@@ -171,8 +171,11 @@ class Stepper {
   ContactProblem<d> posed_;                      // the contact problem that was solved last
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
-  Errors errors_, scales_{0, 0, 0, 0};  // of the step that is being taken; largest values so far
-  double grazing_ = 1;                  // the contact force over a ten thousandth of the largest force, at most 1
+  Errors errors_;  // of the step that is being taken
+  struct {
+    double u = 0, theta = 0, stress = 0, force = 0, contact_force = 0;
+  } scales_;            // largest values so far
+  double grazing_ = 1;  // the contact force over a hundredth of the largest force, at most 1
   double time_ = 0;
   Cost cost_;
 };

@@ -166,14 +166,20 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
     WARMSLIP_PETSC(VecScale(change_u, options_.k));
     const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
+    double by_forces = Errors::unknown;
     note(errors_.stress, scales_.stress, stress_size(layout_, problem_, change_u, change_w).largest,
          std::max(there.largest, 1e-8 * there.possible));
+    if (next_.elastic_u) {  // inner forces far smaller than the others matter to nobody
+      multiply(operators_.elasticity, change_w, momentum_right_);
+      note(by_forces, scales_.force, options_.k * largest_entry(momentum_right_), ledger.force_scale);
+      errors_.stress = std::min(errors_.stress, by_forces);
+    }
   }
   if (contact_) {
-    const double here = largest_entry(surface_.to_nodes(contact.force));
     note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
-         std::max(here, 1e-9 * ledger.force_scale));
-    grazing_ = std::min(1.0, 1e4 * scales_.contact_force / ledger.force_scale);
+         std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
+    scales_.force = std::max(scales_.force, ledger.force_scale);
+    if (scales_.force > 0) grazing_ = std::min(1.0, 1e2 * scales_.contact_force / scales_.force);
   }
   if (apply) {
     if (contact_) contact = std::move(again);
