@@ -81,10 +81,13 @@ def test_friction_to_full_stick(d: int) -> None:
     clamped = squeezed(d)
     plates = {"bottom": [0.0] * d, **clamped.supports.moved}
     exact = fields(right(clamped.override(**{"supports.displacement": plates})))
-    held = right(stuck(d, 1e3))
-    assert held.report.stick == len(held.discretisation.surface.weights)
-    force = fields(held)["contact force"]
-    bound = float((np.linalg.norm(force[:, :-1], axis=1) / np.abs(force[:, -1])).max())
+    job, ratios = Run(stuck(d, 1e3)), []
+    for _, report in job.steps():
+        assert report.stick == len(job.discretisation.surface.weights)
+        force = fields(job)["contact force"]
+        ratios += [np.linalg.norm(force[:, :-1], axis=1) / np.abs(force[:, -1])]
+    assert job.outcome == "right"
+    bound = float(np.max(ratios))
     assert 0.1 < bound < 10
     for coefficient in (1.001 * bound, 1e6):
         assert max(misses(fields(right(stuck(d, coefficient))), exact).values()) <= ROUND_OFF
@@ -104,11 +107,12 @@ def test_regularised_friction_where_all_slips(d: int) -> None:
 
 def test_regularised_friction_where_points_stick(d: int) -> None:
     """A sticking point creeps at a speed in proportion to e: the miss is of first order in e."""
+    sticking = {"contact.friction.coefficient": 2.0}
     approaches(
-        stuck(d, 2.0),
-        lambda e: stuck(d, 2.0).override(**{"contact.friction.regularisation": e}),
+        pushed(d, **sticking),
+        lambda e: pushed(d, **sticking, **{"contact.friction.regularisation": e}),
         order=1,
-        first=1e-3,
+        first=1e-4,
     )
 
 
@@ -306,17 +310,17 @@ def test_poisson_to_a_half(d: int) -> None:
     The change from one ratio to the next then falls by ten whenever 1 - 2 nu does.
     """
     found = []
-    for e in (1e-2, 1e-3, 1e-4, 1e-5):
+    for e in (1e-4, 1e-5, 1e-6, 1e-7):
         one = squeezed(
             d,
             **{"mesh": {"shape": "square", "n": 4, "diagonal": "crisscross"}} if d == 2 else {},
             contact={"part": "bottom", "stiffness": 1e4, "friction": {"coefficient": 0.3}},
         ).override(elasticity=elasticity(d, 100.0, 0.5 - e / 2))
-        job = right(one, digits=7)
+        job = right(one, digits=6)
         found.append({"u": field(job, "u"), "pressure": pressure(job), "force": fields(job)["contact force"]})
         assert any("linear elements lock" in said for said in before(job.discretisation)) == (d == 3)
     changes = [misses(one, other) for one, other in pairwise(found)]
     for large, small in pairwise(changes):
         rates = {name: np.log10(large[name] / small[name]) for name in small}
         assert rates == pytest.approx(dict.fromkeys(rates, 1.0), abs=0.1), changes
-    assert 1e-6 < max(changes[-1].values()) < 1e-3
+    assert 1e-8 < max(changes[-1].values()) < 1e-3
