@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from warmslip import Run, Scene
+from warmslip import Run, Scene, discretise
 from warmslip.scene import build
 
 
@@ -28,11 +29,12 @@ def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
     return [first, *[0.0] * (d - 2), last]
 
 
-def right(one: Scene, digits: float = 8.0) -> Run:
-    """A run that must end right, with so many digits in every field."""
-    job = Run(one)
-    for _ in job.steps():
-        pass
+def right(one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Run, Any], None] | None = None) -> Run:
+    """A run that must end right, with so many digits in every field; `each` is called with run and report of every step."""
+    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    for _, report in job.steps():
+        if each is not None:
+            each(job, report)
     assert job.outcome == "right", (job.outcome, job.failure)
     assert max(job.worst.values()) <= 1e-11, job.worst
     stated = job.summary()["digits"]
