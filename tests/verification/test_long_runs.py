@@ -17,6 +17,7 @@ from warmslip.materials import make_mesh
 pytestmark = pytest.mark.parametrize("d", [2, 3])
 long = pytest.mark.parametrize("steps", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
 ROUND_OFF = 1e-12
+UNIT = float(np.finfo(float).eps)
 
 
 class Forces:
@@ -60,7 +61,7 @@ def test_a_pressed_body_stays_where_it_rests(d: int, steps: int) -> None:
         ),
         each=each,
     )
-    assert max(worst) <= ROUND_OFF
+    assert max(worst) <= UNIT * steps  # u grows by k w in every step, and each sum is rounded
     assert forces.normal[200:] == pytest.approx([1.0] * (steps - 200), rel=ROUND_OFF)
     pull = np.linalg.norm(forces.tangential[200:], axis=1)
     assert pull == pytest.approx(np.full(steps - 200, 0.1), rel=1e2 * ROUND_OFF)
@@ -98,7 +99,9 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
 
 @long
 @pytest.mark.parametrize(
-    ("exchange", "k"), [(True, 0.1), (False, 0.01), (False, 1e3)], ids=["led", "insulated", "insulated, long steps"]
+    ("exchange", "k"),
+    [(True, 0.1), (False, 1e-3), (False, 1e3)],
+    ids=["led", "insulated, short steps", "insulated, long steps"],
 )
 def test_a_body_at_ambient_stays_there(d: int, steps: int, exchange: bool, k: float) -> None:
     """Foundation and body have one temperature, or the body is insulated: no step warms it."""
@@ -305,6 +308,7 @@ def test_growth_of_the_staggered_coupling(d: int, r: float, k: float, grows: boo
 # ---- slivers ---------------------------------------------------------------------------------------------------------
 
 ASPECT = 1e4
+FLAT = ASPECT * UNIT  # round-off of a gradient there, relative
 
 
 def graded(d: int) -> Any:
@@ -362,10 +366,10 @@ def test_slivers_on_a_foundation(d: int, mesh: Callable[[int], Any]) -> None:
     height = np.asarray(job.discretisation.mesh.nodes)[:, -1]
     u = np.zeros((len(height), d))
     u[:, -1] = -r - (press - r) * height
-    assert np.abs(field(job, "u") - u).max() <= ROUND_OFF * press
-    assert np.abs(field(job, "theta") - (3.0 - 2.0 * height)).max() <= ROUND_OFF * 3.0
+    assert np.abs(field(job, "u") - u).max() <= FLAT * press
+    assert np.abs(field(job, "theta") - (3.0 - 2.0 * height)).max() <= FLAT * 3.0
     weights = np.asarray(job.discretisation.surface.weights)
-    assert np.abs(fields(job)["contact force"][:, -1]) == pytest.approx(c * r * weights, rel=1e-9)
+    assert np.abs(fields(job)["contact force"][:, -1]) == pytest.approx(c * r * weights, rel=10 * FLAT)
     assert job.report.normal_force == pytest.approx(c * r, rel=ROUND_OFF)
 
 
@@ -390,10 +394,10 @@ def test_a_patch_of_slivers(d: int, mesh: Callable[[int], Any]) -> None:
         digits=4.0,
     )
     x = np.asarray(job.discretisation.mesh.nodes)
-    assert np.abs(field(job, "u") - x @ gradient.T).max() <= ROUND_OFF * np.abs(x @ gradient.T).max()
-    assert np.abs(field(job, "theta") - (2 * x[:, 0] - x.sum(axis=1))).max() <= ROUND_OFF
+    assert np.abs(field(job, "u") - x @ gradient.T).max() <= FLAT * np.abs(x @ gradient.T).max()
+    assert np.abs(field(job, "theta") - (2 * x[:, 0] - x.sum(axis=1))).max() <= FLAT
     stress = job.discretisation.stress(field(job, "u"), None, None)
     strain = (gradient + gradient.T) / 2
     lam, shear = job.scene.elasticity.pair(d)
     exact = lam * np.trace(strain) * np.eye(d) + 2 * shear * strain
-    assert np.abs(stress - exact).max() <= 1e-10 * np.abs(exact).max()
+    assert np.abs(stress - exact).max() <= 10 * FLAT * np.abs(exact).max()
