@@ -69,7 +69,7 @@ def test_a_pressed_body_stays_where_it_rests(d: int, steps: int) -> None:
 
 @long
 def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
-    """A body in flight keeps speed and momentum, and has no stress at the end of its way."""
+    """A stiff body in flight, in steps far longer than its waves, keeps speed and momentum and has no stress at its end."""
     velocity = np.array(along(d, -2.0, 3.0))
     lost = [0.0]
 
@@ -82,18 +82,18 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
         scene(
             d,
             2,
-            time={"end": 1e-3 * steps, "steps": steps},
+            time={"end": 0.1 * steps, "steps": steps},
             inertia={"density": 5.0},
-            elasticity=elasticity(d, 1e4, 0.3),
+            elasticity=elasticity(d, 2e11, 0.3),
             viscosity={"lame": [1.0, 1.0]},
             initial={"velocity": velocity.tolist()},
         ),
         each=each,
     )
     assert len(lost) > 10 and max(lost) <= 1e-11
-    way = velocity * 1e-3 * steps
+    way = velocity * 0.1 * steps
     assert np.abs(field(job, "w") - velocity).max() <= ROUND_OFF
-    assert np.abs(field(job, "u") - way).max() <= 1e-14 * steps * np.abs(way).max()
+    assert np.abs(field(job, "u") - way).max() <= UNIT * steps * np.abs(way).max()
     assert job.discretisation.mises(job.stepper).max() <= 1e-9
 
 
