@@ -30,9 +30,17 @@ def pushed(d: int, **keys: Any) -> Scene:
     return warmslip.load("paper_mixed" if d == 2 else "block_3d").override(**small | keys)
 
 
-def approaches(limit: Scene, near: Callable[[float], Scene], *, order: float, first: float = 1e-3) -> None:
-    """Every field of `near(e)` misses the limiting model in proportion to e^order, at e = `first` and a tenth of it."""
-    falls(fields(right(limit)), near, order=order, first=first)
+def approaches(
+    limit: Scene, near: Callable[[float], Scene], *, order: float, first: float = 1e-3, last: float | None = 1e-13
+) -> None:
+    """Every field of `near(e)` misses the limiting model in proportion to e^order, at e = `first` and a tenth of it.
+
+    At e = `last` no difference is left but round-off.
+    """
+    exact = fields(right(limit))
+    falls(exact, near, order=order, first=first)
+    if last is not None:
+        assert max(misses(fields(right(near(last))), exact).values()) <= 10 * ROUND_OFF
 
 
 def falls(exact: dict[str, Any], near: Callable[[float], Scene], *, order: float, first: float) -> None:
@@ -113,6 +121,7 @@ def test_regularised_friction_where_points_stick(d: int) -> None:
         lambda e: pushed(d, **sticking, **{"contact.friction.regularisation": e}),
         order=1,
         first=1e-4,
+        last=None,
     )
 
 
