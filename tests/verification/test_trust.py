@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from boxes import along, elasticity, field, right, scene
 
 import warmslip
-from warmslip import Run, Scene
-from warmslip.scene import build
+from warmslip import Run
 
 STEEL: dict[str, Any] = {"young": 2e11, "poisson": 0.3}
 Check = Callable[[int], None]
@@ -27,40 +27,6 @@ def check(function: Check) -> Check:
     """Registers a check that takes the dimension."""
     CHECKS[function.__name__] = function
     return function
-
-
-def elasticity(d: int, young: float, poisson: float) -> dict[str, Any]:
-    return {"young": young, "poisson": poisson, "assumption": "plane_strain" if d == 2 else "solid"}
-
-
-def body(d: int, n: Any, length: float = 1.0) -> dict[str, Any]:
-    return {"shape": "square" if d == 2 else "cube", "n": n, "lengths": [length] * d}
-
-
-def scene(d: int, n: Any, **tables: Any) -> Scene:
-    length = tables.pop("length", 1.0)
-    return build({"mesh": body(d, n, length), "time": {"steps": 4}} | tables)
-
-
-def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
-    """A vector with the given last and first components."""
-    return [first, *[0.0] * (d - 2), last]
-
-
-def right(one: Scene, digits: float = 8.0) -> Run:
-    """A run that must end right, with so many digits in every field."""
-    job = Run(one)
-    for _ in job.steps():
-        pass
-    assert job.outcome == "right", (job.outcome, job.failure)
-    assert max(job.worst.values()) <= 1e-11, job.worst
-    stated = job.summary()["digits"]
-    assert min(stated.values()) >= digits, stated
-    return job
-
-
-def field(job: Run, name: str) -> Any:
-    return job.discretisation.field(getattr(job.stepper, name))
 
 
 # ---- wrong and passed ------------------------------------------------------------------------------------------------
@@ -404,9 +370,10 @@ def test_trust(name: str, d: int) -> None:
 def test_trust_on_two_ranks(d: int) -> None:
     from conftest import child_environment
 
+    environment = child_environment() | {"PYTHONPATH": str(Path(__file__).resolve().parents[1])}
     command = ["mpirun", "-n", "2", sys.executable, str(Path(__file__).resolve()), str(d)]
     result = subprocess.run(
-        command, env=child_environment(), text=True, capture_output=True, timeout=300, check=False, cwd=Path.cwd()
+        command, env=environment, text=True, capture_output=True, timeout=300, check=False, cwd=Path.cwd()
     )
     assert result.returncode == 0, result.stdout + result.stderr
     assert result.stdout.count(f"{len(CHECKS)} checks hold") == 2

@@ -1,0 +1,59 @@
+"""Boxes in the plane and in space whose scenes have only the tables that are given, and runs that must end right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from warmslip import Run, Scene, discretise
+from warmslip.scene import build
+
+
+def elasticity(d: int, young: float, poisson: float) -> dict[str, Any]:
+    return {"young": young, "poisson": poisson, "assumption": "plane_strain" if d == 2 else "solid"}
+
+
+def body(d: int, n: Any, length: float = 1.0) -> dict[str, Any]:
+    return {"shape": "square" if d == 2 else "cube", "n": n, "lengths": [length] * d}
+
+
+def scene(d: int, n: Any, **tables: Any) -> Scene:
+    length = tables.pop("length", 1.0)
+    return build({"mesh": body(d, n, length), "time": {"steps": 4}} | tables)
+
+
+def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
+    """A vector with the given last and first components."""
+    return [first, *[0.0] * (d - 2), last]
+
+
+def right(one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Run, Any], None] | None = None) -> Run:
+    """A run that must end right, with so many digits in every field; `each` is called with run and report of every step."""
+    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    for _, report in job.steps():
+        if each is not None:
+            each(job, report)
+    assert job.outcome == "right", (job.outcome, job.failure)
+    assert max(job.worst.values()) <= 1e-11, job.worst
+    stated = job.summary()["digits"]
+    assert min(stated.values()) >= digits, stated
+    return job
+
+
+def field(job: Run, name: str) -> Any:
+    return job.discretisation.field(getattr(job.stepper, name))
+
+
+def fields(job: Run) -> dict[str, Any]:
+    """What the run has of u, w and theta in mesh numbering, and its contact forces (points, d)."""
+    found = {name: field(job, name) for name in ("u", "w", "theta")}
+    if len(job.stepper.contact_force):
+        found["contact force"] = np.reshape(job.stepper.contact_force, (-1, job.discretisation.dim))
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def misses(one: dict[str, Any], other: dict[str, Any]) -> dict[str, float]:
+    """Largest difference of each field over its largest value in `other`."""
+    return {name: float(np.abs(one[name] - exact).max() / np.abs(exact).max()) for name, exact in other.items()}
