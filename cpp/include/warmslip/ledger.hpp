@@ -105,8 +105,9 @@ class Bookkeeper {
   std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;      // a node
   double rigid_share_ = 1;
-  double stiffest_ = 0;  // largest row of the elasticity
-  Point<d> centroid_;    // moments are taken about it
+  double stiffest_ = 0;                        // largest row of the elasticity
+  double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature
+  Point<d> centroid_;                          // moments are taken about it
 };
 
 }  // namespace warmslip

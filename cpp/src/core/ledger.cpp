@@ -132,6 +132,13 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
   double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
   MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
+  const double length = (layout.mesh().nodes.colwise().maxCoeff() - layout.mesh().nodes.colwise().minCoeff()).norm();
+  for (const Material<d>& material : problem.materials) {
+    reference_ = std::max(reference_, std::abs(material.reference));
+    if (!material.elasticity || !material.expansion) continue;
+    const Mandel<d> strain = material.elasticity->colPivHouseholderQr().solve(to_mandel<d>(*material.expansion));
+    free_expansion_ = std::max(free_expansion_, length * strain.norm());
+  }
   force_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
   heat_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
   interpolate_anew();
@@ -363,6 +370,8 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       most[applied] > 0 ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
   // and displacements whose forces could at most be so small are none
   if (stiffest_ > 0) l.displacement_scale = 1e-8 * l.force_scale / stiffest_;
+  // as are those that rounding of a temperature makes
+  l.displacement_scale = std::max(l.displacement_scale, 1e-8 * free_expansion_ * std::max(theta, reference_));
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.

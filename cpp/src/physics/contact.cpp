@@ -80,18 +80,30 @@ NormalResidual normal_residual(const NormalCompliance& law, double weight, doubl
 
 namespace {
 
-// The slip speed s >= 0 at which bound(s) + beta s is `trial`, and the bound there: the resolvent of a bound that
-// depends on the speed. The least such speed is taken where the bound falls faster than beta.
+// The tangential force at a slip speed, and its derivatives: the bound, or what regularised friction leaves of it.
+FrictionBound traction(const Friction& law, double pressure, double weight, double speed) {
+  const FrictionBound bound = law.bound(pressure, speed);
+  if (law.regularisation == 0) return {weight * bound.value, weight * bound.by_pressure, weight * bound.by_speed};
+  const double blunt = std::hypot(speed, law.regularisation), part = speed / blunt,
+               rise = law.regularisation / blunt / blunt * law.regularisation / blunt;
+  return {weight * bound.value * part, weight * bound.by_pressure * part,
+          weight * (bound.by_speed * part + bound.value * rise)};
+}
+
+// The traction at the slip speed s >= 0 with traction(s) + beta s = trial: its resolvent. The least such speed is taken
+// where the traction falls faster than beta.
 FrictionBound slipping(const Friction& law, double pressure, double weight, double beta, double trial) {
-  double low = 0, high = trial / beta, s = 0;
+  double low = 0, high = trial / beta, s = law.regularisation > 0 ? high : 0;
   FrictionBound at{};
-  for (int i = 0; i < 60; ++i) {
-    at = law.bound(pressure, s);
-    const double excess = weight * at.value + beta * s - trial;
+  for (int i = 0; i < 200; ++i) {
+    at = traction(law, pressure, weight, s);
+    const double excess = at.value + beta * s - trial;
     if (std::abs(excess) <= 4 * std::numeric_limits<double>::epsilon() * trial) break;
     (excess > 0 ? high : low) = s;
-    const double next = s - excess / (weight * at.by_speed + beta);
-    s = next > low && next < high ? next : 0.5 * (low + high);
+    const double next = s - excess / (at.by_speed + beta);
+    // halved on a logarithmic scale: small speeds matter where friction is regularised
+    s = next > low && next < high ? next : low > 0 ? std::sqrt(low) * std::sqrt(high) : 1e-3 * high;
+    if (law.regularisation == 0 && !(next > low && next < high)) s = 0.5 * (low + high);
     if (!(high - low > 1e-15 * high)) break;
   }
   return at;
@@ -110,7 +122,7 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   const Point<d> slip = tangential * velocity;
   const double speed = slip.norm(), pressure = std::max(lambda, 0.0) / point.weight;
   const bool smooth = law.friction.regularisation > 0;
-  FrictionBound friction = law.friction.bound(pressure, smooth ? speed : 0.0);
+  FrictionBound friction = law.friction.bound(pressure, 0);
   double bound = point.weight * friction.value;
 
   PointResidual<d> out;
@@ -129,35 +141,28 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
     out.apart = !out.touching && across.by_force == 1 && across.by_penetration == 0;
     out.value += tangential * force;
     out.by_force += tangential;
-  } else if (smooth) {
-    const double blunt = std::hypot(speed, law.friction.regularisation);
-    const Point<d> direction = slip / blunt, widening = (lambda > 0 ? friction.by_pressure : 0.0) * nu,
-                   weakening = speed > 0 ? Point<d>(point.weight * friction.by_speed / speed * slip)
-                                         : Point<d>(Point<d>::Zero());
-    out.status = speed < law.friction.regularisation ? Status::stick : Status::slip;
-    out.value += tangential * force - bound * direction;
-    out.by_force += tangential - direction * widening.transpose();
-    out.by_velocity -=
-        bound / blunt * (tangential - direction * direction.transpose()) + direction * weakening.transpose();
-  } else if (size <= bound) {
+  } else if (!smooth && size <= bound) {
     out.status = Status::stick;
     out.value -= beta * slip;
     out.by_velocity -= beta * tangential;
   } else {
-    out.status = Status::slip;
-    if (law.friction.custom || law.friction.speed > 0) {
+    out.status = smooth && speed < law.friction.regularisation ? Status::stick : Status::slip;
+    friction.by_pressure *= point.weight;
+    friction.by_speed = 0;
+    if (law.friction.custom || law.friction.speed > 0 || smooth) {
       friction = slipping(law.friction, pressure, point.weight, beta, size);
-      bound = point.weight * friction.value;
+      bound = friction.value;
     }
-    const Point<d> direction = trial / size;
-    // how the bound follows the trial force, and the pressure
-    const double follows = point.weight * friction.by_speed / (point.weight * friction.by_speed + beta);
-    const Point<d> widening = (1 - follows) * (lambda > 0 ? friction.by_pressure : 0.0) * nu;
+    const Point<d> direction = size > 0 ? Point<d>(trial / size) : Point<d>(Point<d>::Zero());
+    // how the traction follows the trial force, and the pressure
+    const double follows = friction.by_speed / (friction.by_speed + beta);
+    const Point<d> widening = (1 - follows) * (lambda > 0 ? friction.by_pressure / point.weight : 0.0) * nu;
     for (int a = 0; a < d && out.slip_sign == 0; ++a)
       if (std::abs(direction[a]) > 0.5) out.slip_sign = direction[a] > 0 ? a + 1 : -(a + 1);
     // the direction turns only for d = 3
     Tensor2<d> turn = follows * (direction * direction.transpose());
-    if (d == 3) turn += bound / size * (tangential - direction * direction.transpose());
+    const double turns = size > 0 ? bound / size : follows;
+    if (d == 3 || size == 0) turn += turns * (tangential - direction * direction.transpose());
     out.value += tangential * force - bound * direction;
     out.by_force += tangential - turn - direction * widening.transpose();
     out.by_velocity -= beta * turn;
@@ -188,7 +193,13 @@ double friction_defect(const Friction& friction, double bound, const Point<d>& f
   const double slips =
       smeared > 0 ? (force - bound / smeared * slip_velocity).norm() : std::max(force.norm() - bound, 0.0);
   if (slips == 0) return 0;
-  if (friction.regularisation > 0 || speed == 0) return slips / forces;
+  if (friction.regularisation > 0) {  // the force may be wrong, or the velocity that it belongs to
+    const double size = force.norm();
+    if (size >= bound) return slips / forces;
+    const double part = size / bound, belongs = friction.regularisation / std::sqrt((1 - part) * (1 + part)) / bound;
+    return std::min(slips / forces, (slip_velocity - belongs * force).norm() / velocities);
+  }
+  if (speed == 0) return slips / forces;
   const double size = force.norm(), beyond = std::max(size - bound, 0.0) / forces;
   const double sticks = std::max(beyond, speed / velocities);
   if (size == 0) return std::min(slips / forces, sticks);

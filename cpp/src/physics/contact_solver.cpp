@@ -212,11 +212,16 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
     const auto i = static_cast<std::size_t>(closed_[static_cast<std::size_t>(row)] / d);
     tangent.template middleRows<d>(row) = (at.points[i].by_velocity * tangent.template middleRows<d>(row)).eval();
     tangent.template block<d, d>(row, row) += at.points[i].by_force;
-    // Gauss points outnumber nodes: sticking ones share their force arbitrarily, and this picks the nearest share.
-    // The residual is untouched, so the answer is not regularised.
-    if (at.points[i].status == Status::stick && options_.proximal > 0) {
+    // Gauss points outnumber nodes: those that stick, or are pressed on a rigid foundation, share their force
+    // arbitrarily, and this picks the nearest share. The residual is untouched, so the answer is not regularised.
+    if (options_.proximal > 0) {
       const Point<d>& nu = problem.points[i].normal;
-      tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - nu * nu.transpose());
+      const Tensor2<d> normal = nu * nu.transpose();
+      if (at.points[i].status == Status::stick)
+        tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - normal);
+      if (at.points[i].touching)
+        tangent.template block<d, d>(row, row) +=
+            std::max(0.0, options_.proximal - nu.dot(at.points[i].by_force * nu)) * normal;
     }
   }
   if (n + m > 0) tangent_.compute(tangent);
@@ -271,8 +276,9 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
     const double forces =
         rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
-    // a correction of what is known is wanted, however little it is
-    const bool wanted = step == 0 && problem.known_force.size() > 0;
+    // a correction of what is known is wanted, however little it is, but not another solution of a law that has several
+    const bool wanted =
+        step == 0 && problem.known_force.size() > 0 && at.value.head(all).norm() <= 1e-6 * solution.force.norm();
     if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
