@@ -76,6 +76,7 @@ class ContactSolver {
 
  private:
   struct Linearisation;
+  struct Trial;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& force,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
