@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import re
@@ -107,6 +108,9 @@ def _misused(error: Any) -> str:
 
 def _explain(error: Exception) -> tuple[str, int]:
     """A sentence and an exit code: 2 for what the user can mend in the call, 1 for a run that failed."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"the disk is full{where}; make room, then go on from the last checkpoint with --resume", 1
     if isinstance(error, OSError):
         where = f" ({error.filename})" if error.filename else ""
         return f"cannot read or write a file{where}: {error.strerror or error}; check the path and its rights", 2
