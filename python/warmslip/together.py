@@ -6,7 +6,7 @@ import sys
 import time
 from types import TracebackType
 
-PATIENCE = 5.0  # seconds in which the others come to the same end, if they do
+PATIENCE = 3.0  # seconds in which the others come to the same end, if they do
 
 
 def others_come() -> bool:
