@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fuzz bench mutants lint docs extremes envelope
+.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -25,6 +25,9 @@ coverage: setup  ## lines and branches of the C++ core that the fast tests reach
 
 asan: setup  ## the C++ tests under the address and undefined behaviour sanitizers
 	@$(env) cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
+
+fused: setup  ## the answers of a build with -O3, wide vectors and fused multiply-add against those of the release build, to 1e-12
+	@$(env) cmake --preset fused >/dev/null && cmake --build --preset fused && ctest --preset fused
 
 fuzz: setup  ## random bytes through every reader of files, under the sanitizers for ten minutes (ARGS: seconds, readers)
 	@$(env) bash tests/fuzz/run.sh $(ARGS)

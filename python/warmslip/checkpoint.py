@@ -91,7 +91,11 @@ def save(folder: Path, job: Run) -> None:
     arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
     newest, previous = (folder / name for name in NAMES)
     written = folder / "checkpoint.part.npz"
-    np.savez(written, record=np.array(json.dumps(record)), **arrays)
+    try:
+        np.savez(written, record=np.array(json.dumps(record)), **arrays)
+    except OSError:
+        written.unlink(missing_ok=True)  # the disk may be full
+        raise
     if newest.exists():
         os.replace(newest, previous)
     os.replace(written, newest)

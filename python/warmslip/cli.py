@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import re
@@ -11,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.logging import RichHandler
 
-from warmslip import cli_scene, cli_study, cli_verify
+from warmslip import cli_scene, cli_study, cli_verify, together
 from warmslip.cli_options import console
 from warmslip.scene import SceneError
 
@@ -67,6 +68,9 @@ def main() -> None:
         sys.exit(code if isinstance(code, int) else 0)
     except SceneError as error:  # every rank reads the same scene and refuses it alike
         _say(str(error), everywhere=False)
+        if not together.others_come():  # they have read another scene
+            _say(f"the ranks read different scenes; one of them refused: {error}", everywhere=True)
+            together.abort(2)
         sys.exit(2)
     except Exception as error:
         if hasattr(error, "format_message"):  # of the call itself; typer brings a click of its own, or uses another's
@@ -81,9 +85,8 @@ def main() -> None:
         _say(message, everywhere=True)
         from mpi4py import MPI
 
-        if MPI.COMM_WORLD.size > 1:  # a rank that ends alone would leave the others waiting for ever
-            sys.stderr.flush()
-            MPI.COMM_WORLD.Abort(code)
+        if MPI.COMM_WORLD.size > 1:
+            together.abort(code)
         sys.exit(code)
 
 
@@ -105,6 +108,9 @@ def _misused(error: Any) -> str:
 
 def _explain(error: Exception) -> tuple[str, int]:
     """A sentence and an exit code: 2 for what the user can mend in the call, 1 for a run that failed."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"the disk is full{where}; make room, then go on from the last checkpoint with --resume", 1
     if isinstance(error, OSError):
         where = f" ({error.filename})" if error.filename else ""
         return f"cannot read or write a file{where}: {error.strerror or error}; check the path and its rights", 2

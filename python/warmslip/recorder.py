@@ -20,6 +20,34 @@ REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "norm
 LEDGER = tuple(_core.Ledger.terms)
 # held back before it is written: bytes, seconds
 LARGEST, LONGEST = 2**25, 1.0
+SPARE = 2**19  # bytes that are kept free for closing the file: HDF5 does not survive a full disk
+
+
+class Ballast:
+    """Room on the disk of a run, held by a file that is given up when the disk is full."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "room.part"
+        self._take(self._path, SPARE)
+
+    def _take(self, path: Path, size: int) -> None:
+        try:
+            with path.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as error:
+            self.release()
+            raise OSError(error.errno, error.strerror, str(path.parent)) from None
+
+    def refuse(self, size: int) -> None:
+        """Raises OSError when `size` bytes more have no room."""
+        trial = self._path.with_suffix(".trial")
+        try:
+            self._take(trial, size)
+        finally:
+            trial.unlink(missing_ok=True)
+
+    def release(self) -> None:
+        self._path.unlink(missing_ok=True)
 
 
 class TrajectoryWriter:
@@ -35,6 +63,7 @@ class TrajectoryWriter:
         """`keep` steps of the file that is there are kept, of a run that is resumed."""
         self._d, self._stepper, self._taken = discretisation, stepper, keep
         self._file: h5py.File | None = None
+        self._full = False
         self._writing, self._stored = path is not None, -1
         self._alone = comm.size == 1
         self._rows: dict[str, list[Array]] = {}
@@ -49,6 +78,7 @@ class TrajectoryWriter:
             earlier.unlink(missing_ok=True)
         elif not earlier.exists():  # else a resumed run was killed while it copied
             os.replace(path, earlier)
+        self._ballast = Ballast(path.parent)
         file = self._file = h5py.File(path, "w", libver="latest")
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
         file.attrs["digest"] = discretisation.scene.digest()
@@ -94,8 +124,11 @@ class TrajectoryWriter:
 
     def write(self) -> None:
         """Writes what is held back and flushes it."""
-        if self._file is None:
+        if self._file is None or self._full:
             return
+        self._full = True
+        self._ballast.refuse(2 * self._held + SPARE)
+        self._full = False
         for name, rows in self._rows.items():
             dataset = self._file[name]
             dataset.resize(len(dataset) + len(rows), axis=0)
@@ -175,7 +208,7 @@ class TrajectoryWriter:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         # after an error on one of many ranks the others are elsewhere, and gathering would wait for them
-        if self._writing and (kind is None or self._alone):
+        if self._writing and not self._full and (kind is None or self._alone):
             if self._stored != self._taken:
                 self._state()
             self.write()
@@ -187,4 +220,5 @@ class TrajectoryWriter:
                 self._file["fields/mises"] = mises
         if self._file is not None:
             self.write()
+            self._ballast.release()
             self._file.close()

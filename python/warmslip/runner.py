@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import _core, checkpoint, mesh_io, provenance, summary
+from warmslip import _core, checkpoint, mesh_io, provenance, summary, together
 from warmslip.interruption import Interruption
 from warmslip.laws import Law
 from warmslip.loads import Loads
@@ -93,6 +93,7 @@ class Run:
         self.began = time.perf_counter(), time.process_time()
         self.scene = scene
         self.comm = MPI.COMM_WORLD if comm is None else comm
+        together.guard()
         self.discretisation = discretisation or discretise(scene, comm=self.comm, loads=loads, laws=laws)
         self.stepper = self.discretisation.stepper(backend=backend)
         self.worst = dict.fromkeys(IDENTITIES, 0.0)

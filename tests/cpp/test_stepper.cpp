@@ -1,7 +1,8 @@
 // Factorizations and the stepper on the paper's problem in the plane and one dimension up, on any number of ranks.
 #include <doctest/doctest.h>
 
-#include "warmslip/stepper.hpp"
+#include "paper.hpp"
+#include "trapping.hpp"
 
 using namespace warmslip;
 
@@ -10,62 +11,23 @@ namespace {
 using Two = std::integral_constant<int, 2>;
 using Three = std::integral_constant<int, 3>;
 
-/// The paper's data with K = I, M = I and R = heating I; in 3D on a cube held at the top, warm everywhere but below.
+/// Steps to T = 1 that close their books.
 template <int d>
-struct Paper {
-  std::shared_ptr<const Mesh<d>> mesh;
-  Problem<d> problem;
-  Layout<d> layout;
-  Operators<d> operators;
-  ContactSurface<d> surface;
-  VecHandle force, heat;
+struct Paper : PaperProblem<d> {
+  using PaperProblem<d>::PaperProblem;
+  using PaperProblem<d>::layout, PaperProblem<d>::surface;
 
-  static std::shared_ptr<const Mesh<d>> unit_box(int n) {
-    std::array<int, d> counts;
-    std::array<double, d> lengths;
-    counts.fill(n);
-    lengths.fill(1);
-    return std::make_shared<Mesh<d>>(box<d>(counts, lengths, Diagonal::right));
-  }
-  static Problem<d> paper(std::shared_ptr<const Mesh<d>> mesh, double heating, int quadrature) {
-    const Tensor2<d> id = Tensor2<d>::Identity();
-    const Material<d> material{1, isotropic<d>(0.2, 0.9), isotropic<d>(10, 5), id, id, heating * id};
-    std::vector<std::string> cooled{"top", "left", "right"};
-    if (d == 3) cooled.insert(cooled.end(), {"front", "back"});
-    return {std::move(mesh), {material}, {}, {"top"}, cooled, {{"bottom", ContactLaw{{1e4}, {0.2}}, {quadrature}, 1}}};
-  }
-  explicit Paper(int n, double heating = 1, int quadrature = 0)
-      : mesh(unit_box(n)),
-        problem(paper(mesh, heating, quadrature)),
-        layout(PETSC_COMM_WORLD, mesh),
-        operators(layout, problem),
-        surface(layout, problem),
-        force(layout.vector(d)),
-        heat(layout.vector(1)) {
-    Point<d> weight = -Point<d>::Unit(d - 1), left = 0.4 * Point<d>::Unit(d - 1), right = left;
-    left[0] = 1.4;
-    right[0] = -0.8;
-    add(std::nullopt, weight, force);
-    add("left", left, force);
-    add("right", right, force);
-    add(std::nullopt, Eigen::VectorXd::Ones(1), heat);
-    add("bottom", Eigen::VectorXd::Constant(1, 10), heat);
-  }
-  void add(const std::optional<std::string>& part, const Eigen::VectorXd& value, Vec to) {
-    const LoadQuadrature<d> rule(layout, part, 1);
-    WARMSLIP_PETSC(VecAXPY(to, 1, rule.load(value.transpose().replicate(rule.positions().rows(), 1))));
-  }
   /// |u|_V, |w|, |theta|, normal force after `steps` steps to T = 1, every identity within 1e-11 on the way. With
   /// `refine`, every step gets the iterative refinement that only fine meshes need.
   Eigen::Vector4d run(int steps, Coupling coupling, Backend backend = Backend::automatic, bool refine = false) {
+    const Trapping trapping;
     StepperOptions options{1.0 / steps, coupling, backend, {}};
     if (refine) options.refinement = -1;
-    Stepper<d> stepper(layout, problem, operators, surface, options);
-    const Eigen::VectorXd gap = Eigen::VectorXd::Zero(surface.points());
-    stepper.start(layout.vector(d), layout.vector(d), layout.vector(1), gap);
+    Stepper<d> stepper = PaperProblem<d>::stepper(options);
+    this->start(stepper);
     StepReport<d> report;
     for (int n = 0; n < steps; ++n) {
-      report = stepper.advance({force, heat, gap});
+      report = stepper.advance(this->loads());
       REQUIRE(report.outcome == Outcome::right);
       const Ledger& l = report.ledger;
       CHECK(std::max({l.energy_residual, l.heat_residual, l.force_residual}) <= 1e-11);

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 import weakref
 from pathlib import Path
 
@@ -169,3 +170,76 @@ def test_a_dropped_run_frees_its_memory_at_once() -> None:
     dropped = weakref.ref(job)
     del job
     assert dropped() is None
+
+
+FAILING_ALONE = """
+import os
+import signal
+import sys
+from mpi4py import MPI
+import warmslip
+
+rank, how = MPI.COMM_WORLD.rank, sys.argv[1]
+
+def observer(state, report):
+    if state.step == 2 and rank == int(sys.argv[2]):
+        if how == "raises":
+            raise ValueError("no such thing")
+        if how == "out of memory":
+            raise MemoryError("no room")
+        if how == "everywhere":
+            raise ValueError("no such thing")
+        os.kill(os.getpid(), signal.SIGKILL)
+    elif how == "everywhere" and state.step == 2:
+        raise ValueError("no such thing")
+
+scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 2000})
+warmslip.run(scene, observers=[observer], out="run")
+"""
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("how", "rank"),
+    [("raises", 0), ("raises", 1), ("out of memory", 1), ("is killed", 0), ("is killed", 1), ("everywhere", 0)],
+)
+def test_a_rank_that_fails_alone_ends_all(tmp_path: Path, how: str, rank: int) -> None:
+    """A script as users write it, without `-m mpi4py`; where all ranks raise, each ends by itself and none is aborted."""
+    (tmp_path / "script.py").write_text(FAILING_ALONE)
+    began = time.monotonic()
+    result = subprocess.run(
+        ["mpirun", "-n", "2", sys.executable, "script.py", how, str(rank)],
+        env=child_environment(),
+        cwd=tmp_path,
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+    assert result.returncode != 0 and time.monotonic() - began < 30
+    said = {"raises": "ValueError: no such thing", "out of memory": "MemoryError: no room", "is killed": "signal 9"}
+    if how == "everywhere":
+        assert result.stderr.count("ValueError: no such thing") == 2
+        assert "failed alone" not in result.stderr
+    else:
+        assert result.stderr.count(said[how]) == 1
+        assert result.stderr.count(f"rank {rank} failed alone: all ranks are ended") == (how != "is killed")
+
+
+@pytest.mark.mpi
+def test_ranks_that_read_different_scenes_end_together(tmp_path: Path) -> None:
+    """As where a file is on one machine and not on the other."""
+    program = Path(sys.executable).parent / "warmslip"
+    mine = [program, "run", "paper_mixed", "--set", "mesh.n=8", "--set", "time.steps=4000"]
+    theirs = [program, "run", "nowhere.toml"]
+    result = subprocess.run(
+        ["mpirun", "-n", "1", *map(str, mine), ":", "-n", "1", *map(str, theirs)],
+        env=child_environment(),
+        cwd=tmp_path,
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+    assert result.returncode == 2
+    assert result.stderr.count("the ranks read different scenes; one of them refused: cannot read scene") == 1

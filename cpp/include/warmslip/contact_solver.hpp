@@ -80,6 +80,7 @@ class ContactSolver {
 
  private:
   struct Linearisation;
+  struct Trial;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;

@@ -57,10 +57,22 @@ cholmod_sparse view(std::vector<int>& start, std::vector<int>& index, double* va
   return a;
 }
 
+// CHOLMOD's own data and its factor, freed also when memory runs out on the way.
+struct Workspace : cholmod_common {
+  Workspace() : cholmod_common{} { cholmod_start(this); }
+  ~Workspace() { cholmod_finish(this); }
+  Workspace(const Workspace&) = delete;
+};
+
+struct Release {
+  Workspace* common;
+  void operator()(cholmod_factor* factor) const { cholmod_free_factor(&factor, common); }
+};
+using CholmodHandle = std::unique_ptr<cholmod_factor, Release>;
+
 class CholmodFactor final : public Factor {
  public:
   CholmodFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block) {
-    cholmod_start(&common_);
     common_.print = 0;
     Triangle triangle(k);
     const auto n = triangle.start.size() - 1;
@@ -77,23 +89,18 @@ class CholmodFactor final : public Factor {
     const bool definite = symmetry == Symmetry::positive_definite || symmetry == Symmetry::definite_or_refused;
     common_.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     for (int i = 0; i < 3; ++i) common_.nrelax[i] = 0, common_.zrelax[i] = 0;  // every stored zero would be substituted
-    factor_ = cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_);
-    usable_ =
-        factor_ && cholmod_factorize(&a, factor_, &common_) && common_.status == CHOLMOD_OK && factor_->minor == n;
-    usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_, &common_);
+    factor_.reset(cholmod_analyze_p(&a, permutation_.data(), nullptr, 0, &common_));
+    usable_ = factor_ && cholmod_factorize(&a, factor_.get(), &common_) && common_.status == CHOLMOD_OK &&
+              factor_->minor == n;
+    usable_ = usable_ && cholmod_change_factor(CHOLMOD_REAL, 0, 0, 1, 1, factor_.get(), &common_);
     if (!usable_) return;
     last_block();
     panels_ = Panels(n, static_cast<const int*>(factor_->p), static_cast<const int*>(factor_->nz),
                      static_cast<const int*>(factor_->i), static_cast<const double*>(factor_->x));
-    cholmod_free_factor(&factor_, &common_);
+    factor_.reset();
     half_.resize(static_cast<Eigen::Index>(n));
     usable_ = accurate(k);
     substitutions_ = 0;
-  }
-
-  ~CholmodFactor() override {
-    if (factor_) cholmod_free_factor(&factor_, &common_);
-    cholmod_finish(&common_);
   }
 
   bool usable() const { return usable_; }
@@ -213,8 +220,8 @@ class CholmodFactor final : public Factor {
     return error <= 1e-12 * (size + factor_size * solution);
   }
 
-  cholmod_common common_{};
-  cholmod_factor* factor_ = nullptr;
+  Workspace common_;
+  CholmodHandle factor_{nullptr, Release{&common_}};
   Panels panels_;
   Eigen::VectorXd half_;  // the right-hand side, half way
   std::vector<int> permutation_;

@@ -39,7 +39,7 @@ double largest_entry(const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().
 double Errors::largest() const {
   double worst = 0;
   for (const double error : {u, theta, stress, contact_force})
-    if (error > worst) worst = error;
+    if (std::isgreater(error, worst)) worst = error;  // quiet about nan, also where it traps
   return worst;
 }
 
@@ -229,7 +229,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
         {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
   };
   // a pass whose change is small says that the one before has done its work
-  const auto done = [&](double rest, double error) { return rest <= enough && !(error > 1e-9); };
+  const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
   for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
@@ -313,7 +313,7 @@ std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
       for (const auto& [name, error] :
            {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta}, std::pair{"the stress", errors_.stress},
             std::pair{"the contact force", weighed().contact_force}})
-        if (error > options_.error_bound) list(name);
+        if (std::isgreater(error, options_.error_bound)) list(name);
       return "fewer than four digits of " + names +
              " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for "
              "double "

@@ -90,7 +90,8 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     }
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
                  away = distance(law.compliance, lambda / point.weight, r);
-    const double normal = off == 0 || away == 0 ? 0 : std::min(off / largest, away / reach);
+    const double wrong = largest > 0 ? off / largest : unlimited;
+    const double normal = off == 0 || away == 0 ? 0 : std::min(wrong, away / reach);
     const double friction =
         friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
     if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
@@ -195,6 +196,7 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
 template <int d>
 void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
   if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
+  factored_.clear();                                      // until it is whole: memory may run out on the way
   closed_.clear();
   for (std::size_t i = 0; i < at.points.size(); ++i)
     if (!at.points[i].apart)
@@ -224,6 +226,8 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
             std::max(0.0, options_.proximal - nu.dot(at.points[i].by_force * nu)) * normal;
     }
   }
+  // anew: Eigen's matrices lose their memory when they grow and cannot
+  if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
   solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && !(tangent_.rcond() > 1e-14);
@@ -455,6 +459,21 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
   return false;
 }
 
+// Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
+template <int d>
+struct ContactSolver<d>::Trial {
+  explicit Trial(ContactSolver& owner) : solver(owner), steps(owner.options_.newton_steps) { solver.forget(); }
+  ~Trial() {
+    solver.carries_ = false;
+    solver.boldness_ = 1;
+    solver.options_.newton_steps = steps;
+    solver.forget();
+  }
+  Trial(const Trial&) = delete;
+  ContactSolver& solver;
+  int steps;
+};
+
 template <int d>
 ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
   ContactSolution<d> solution;
@@ -481,15 +500,11 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   };
   // a body that lies on the foundation gives way by its deformation, one that hits it as a whole
   const auto moving = [&](bool carries, int steps) {
+    const Trial trial(*this);
     carries_ = carries;
-    factored_.clear();
+    options_.newton_steps = steps;
     move();
-    std::swap(options_.newton_steps, steps);
-    const bool found = newton(problem, true, solution);
-    std::swap(options_.newton_steps, steps);
-    carries_ = false;
-    factored_.clear();
-    return found;
+    return newton(problem, true, solution);
   };
   attempt(Stage::newton, [&] {
     move();
@@ -520,14 +535,11 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   // again from no force, with other scales of the tangential rows
   for (const double boldness : {1.0, 0.1, 10.0, 0.01})
     attempt(Stage::restart, [&] {
+      const Trial trial(*this);
       boldness_ = boldness;
-      factored_.clear();
       solution.added = none;
       move();
-      const bool found = newton(problem, true, solution);
-      if (boldness_ != 1) factored_.clear();
-      boldness_ = 1;
-      return found;
+      return newton(problem, true, solution);
     });
   attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
