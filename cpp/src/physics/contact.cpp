@@ -175,12 +175,13 @@ Point<d> settled(const ContactLaw& law, const ContactPoint<d>& point, double k, 
                  const Point<d>& free, const Point<d>& velocity) {
   const Point<d>& nu = point.normal;
   const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
-  const double pressure = force.dot(nu) / point.weight, size = along(point.displacement) + std::abs(point.gap);
+  const double pressure = force.dot(nu) / point.weight,
+               size = along(point.displacement) + std::abs(point.gap) + k * along(velocity);
   double across = velocity.dot(nu);
   Point<d> slip = velocity - across * nu;
   const bool rests = law.friction.regularisation == 0 && slip.norm() <= 1e-9 * free.norm();
   if (status == Status::stick && rests) slip.setZero();
-  if (pressure > 0 && size <= k * along(free) && !law.compliance.custom && !law.compliance.at_limit(pressure))
+  if (pressure > 0 && size <= 1e-3 * k * along(free) && !law.compliance.custom && !law.compliance.at_limit(pressure))
     across = (law.compliance.penetration(pressure, 0) - point.penetration) / k;
   return across * nu + slip;
 }
