@@ -98,6 +98,7 @@ class ContactSolver {
   RigidCoupling rigid_;
   double boldness_ = 1;               // of the tangential rows, against the reciprocal of the point's own compliance
   Eigen::MatrixXd carried_;           // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
+  double share_ = 0;                  // > 0: pressed points share their force on a stiff foundation as on a rigid one
   bool carries_ = false;              // whether a point's own compliance includes the rigid motions
   double give_ = 1;                   // velocity per force, the unit of the rigid motions
   double spectral_ = 0;               // largest row sum of |compliance|, a bound on its eigenvalues

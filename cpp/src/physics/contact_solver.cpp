@@ -221,9 +221,9 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
       const Tensor2<d> normal = nu * nu.transpose();
       if (at.points[i].status == Status::stick)
         tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - normal);
+      const double share = problem.law(i).compliance.rigid() ? options_.proximal : share_;
       if (at.points[i].touching)
-        tangent.template block<d, d>(row, row) +=
-            std::max(0.0, options_.proximal - nu.dot(at.points[i].by_force * nu)) * normal;
+        tangent.template block<d, d>(row, row) += std::max(0.0, share - nu.dot(at.points[i].by_force * nu)) * normal;
     }
   }
   // anew: Eigen's matrices lose their memory when they grow and cannot
@@ -466,6 +466,7 @@ struct ContactSolver<d>::Trial {
   ~Trial() {
     solver.carries_ = false;
     solver.boldness_ = 1;
+    solver.share_ = 0;
     solver.options_.newton_steps = steps;
     solver.forget();
   }
@@ -537,6 +538,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     attempt(Stage::restart, [&] {
       const Trial trial(*this);
       boldness_ = boldness;
+      share_ = options_.proximal;
       solution.added = none;
       move();
       return newton(problem, true, solution);
