@@ -136,14 +136,15 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   if (contact_) {
     const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
     posed_.known_force = contact.force;
-    posed_.known_velocity = velocity + correction;
+    posed_.known_velocity = apply ? velocity + correction : velocity;
     posed_.rigid = rigid_load_;
     posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
-    if (!solve_contact(contact.force, again)) return false;
+    again = contact;
+    if (!(apply ? solve_contact(contact.force, again) : contact_->respond(posed_, correction, again))) return false;
     if (apply) free_ = posed_.free;
     change = again;
     change.force = again.added;
-    again.iterations += contact.iterations;
+    if (apply) again.iterations += contact.iterations;
     again.stage = std::max(again.stage, contact.stage);
   }
   const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);

@@ -340,6 +340,25 @@ void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<
   solution = std::move(finer);
 }
 
+template <int d>
+bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change,
+                               ContactSolution<d>& solution) {
+  const Eigen::Index all = compliance_.rows();
+  Linearisation at =
+      linearise(problem, Eigen::VectorXd::Zero(all), Eigen::VectorXd(Eigen::VectorXd::Zero(rigid_.count())));
+  factor(problem, at, solution);
+  for (Eigen::Index row = 0; row < all; row += d)
+    at.value.template segment<d>(row) =
+        at.points[static_cast<std::size_t>(row / d)].by_velocity * change.template segment<d>(row);
+  at.value.tail(rigid_.count()) = -problem.rigid;
+  const Eigen::VectorXd response = direction(at);
+  if (!response.allFinite()) return false;
+  solution.added = response.head(all);
+  solution.force = problem.known_force + solution.added;
+  solution.rigid = give_ * response.tail(rigid_.count());
+  return true;
+}
+
 // Thresholds frozen, the step is convex: minimise 1/2 l.C l - l.free plus the law's conjugate by accelerated proximal
 // gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
 template <int d>
