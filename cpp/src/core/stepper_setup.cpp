@@ -73,7 +73,7 @@ void Stepper<d>::take_factors() {
       const MatHandle h = heat_matrix(operators_, k);
       // a capacity and an exchange that hold the constant temperature beside the conduction need no help
       const double storing = largest_diagonal(operators_.mass) / k + largest_diagonal(operators_.exchange);
-      if (storing < 1e-3 * largest_diagonal(operators_.conductivity))
+      if (storing < 0.1 * largest_diagonal(operators_.conductivity))
         constants_ = RigidMotions(layout_, 1, problem_.cooled, exchanging);
       if (!constants_.empty()) constants_.add_springs(h);
       const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
