@@ -73,9 +73,9 @@ class ContactSolver {
   /// Solves from the guess `force` (d points). Never throws on failure to converge: `converged` says so.
   ContactSolution<d> solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force);
 
-  /// What a small change of the free velocities, (d points), and of the load on the rigid motions, `problem.rigid`, adds
-  /// to a solution that is the known one of `problem`, statuses kept: `added`, `force` and `rigid` of it. False where
-  /// the tangent is singular.
+  /// What a small change of the free velocities, (d points), and of the load on the rigid motions, `problem.rigid`,
+  /// adds to a solution that is the known one of `problem`, statuses kept: `added`, `force` and `rigid` of it. False
+  /// where the tangent is singular.
   bool respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change, ContactSolution<d>& solution);
 
   /// Drops the remembered tangent: the next solve does what a new solver would, to the last bit.

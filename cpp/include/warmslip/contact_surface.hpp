@@ -42,6 +42,9 @@ class ContactSurface {
   const std::vector<Index>& mesh_nodes() const { return nodes_; }  ///< the contact nodes in the mesh's numbering
   /// Values at the contact points, (d points), of nodal ones, (d nodes).
   Eigen::VectorXd at_points(const Eigen::VectorXd& nodal) const;
+  /// Means over the points about every node, (nodes), of values at the points, (points); no more and no less than
+  /// these.
+  Eigen::VectorXd nodal_mean(const Eigen::VectorXd& values) const;
   /// Forces at the points as nodal forces, without those that a support takes, (d nodes).
   Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
   /// Compliance of the points from that of the nodes; a node whose displacement is prescribed has none.

@@ -94,8 +94,9 @@ class Bookkeeper {
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, contact_force_;             // B w, E lambda
-  VecHandle conducted_, exchanged_, contact_heat_;  // D theta, J theta, heat that leaves at the contact points
+  VecHandle viscous_w_, contact_force_;  // B w, E lambda
+  VecHandle conducted_, exchanged_, contact_heat_,
+      contact_heat_size_;  // D theta, J theta, heat that leaves at the contact points
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;  // hat functions at the contact points, found anew from positions
   Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed

@@ -127,7 +127,7 @@ class Stepper {
   void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
-  void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out);
+  void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside, Vec out);
   void take_flow(const StepLoads& loads);
   Ledger balance(const StepInputs& inputs);
   Errors weighed() const;
@@ -166,9 +166,10 @@ class Stepper {
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
   Eigen::VectorXd free_;                         // velocity of the contact points without contact force
   Eigen::VectorXd rigid_load_;                   // load on the rigid motions
-  Eigen::MatrixXd flow_;                         // heat that contact nodes lose by their temperatures
-  Eigen::VectorXd given_flow_;                   // and what they receive whatever these are
-  ContactProblem<d> posed_;                      // the contact problem that was solved last
+  Eigen::MatrixXd flow_;        // heat that contact nodes lose by what they are warmer than the foundation
+  Eigen::VectorXd given_flow_;  // and what they receive whatever they are
+  Eigen::VectorXd beside_;      // temperature of the foundation at the contact nodes
+  ContactProblem<d> posed_;     // the contact problem that was solved last
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_;  // of the step that is being taken

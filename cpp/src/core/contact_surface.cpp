@@ -152,6 +152,21 @@ Eigen::VectorXd ContactSurface<d>::at_points(const Eigen::VectorXd& nodal) const
 }
 
 template <int d>
+Eigen::VectorXd ContactSurface<d>::nodal_mean(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(nodes()), weight = sum,
+                  low = Eigen::VectorXd::Constant(nodes(), INFINITY), high = -low;
+  for (Eigen::Index q = 0; q < scalar_shape_.outerSize(); ++q)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(scalar_shape_, q); entry; ++entry) {
+      const Eigen::Index node = entry.col();
+      sum[node] += weights_[q] * entry.value() * values[q];
+      weight[node] += weights_[q] * entry.value();
+      low[node] = std::min(low[node], values[q]);
+      high[node] = std::max(high[node], values[q]);
+    }
+  return sum.cwiseQuotient(weight).cwiseMax(low).cwiseMin(high);
+}
+
+template <int d>
 Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const {
   return (shape_.transpose() * forces).cwiseProduct(free_);
 }

@@ -121,7 +121,10 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   if (surface.points() > 0) contact_force_ = layout.vector(d);
   if (operators.conductivity) conducted_ = layout.vector(1);
   if (operators.exchange) exchanged_ = layout.vector(1);
-  if (operators.conductivity && problem.contact_heats()) contact_heat_ = layout.vector(1);
+  if (operators.conductivity && problem.contact_heats()) {
+    contact_heat_ = layout.vector(1);
+    contact_heat_size_ = layout.vector(1);
+  }
   centroid_ = layout.mesh().nodes.colwise().mean().transpose();
   const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   for (PetscInt& i : unknowns_) i -= first * d;
@@ -266,7 +269,7 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
 template <int d>
 void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const Eigen::VectorXd& w, Ledger& l) {
   const Eigen::VectorXd theta = at_points(after.theta);
-  Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points());
+  Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points()), sizes = leaving;
   const double rest = 1e-12 * in.contact_free.cwiseAbs().maxCoeff();  // a slip below is rounding
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const ContactPart& part = problem_.contacts[surface_.contact(i)];
@@ -277,8 +280,12 @@ void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const
     l.exchanged += in.k * conducted * theta[i];
     l.friction_heating += in.k * made * theta[i];
     leaving[i] = conducted - made;
+    sizes[i] =
+        part.heat.per_pressure * std::max(force.dot(nu), 0.0) * (std::abs(theta[i]) + std::abs(in.foundation[i])) +
+        std::abs(made);
   }
   place(nodes_, shape_.transpose() * leaving, contact_heat_);
+  place(nodes_, shape_.transpose() * sizes, contact_heat_size_);
 }
 
 // Momentum tested with k w_n.
@@ -387,7 +394,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                speed = std::max(after.sizes.w, before.sizes.w);
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
-        c(contact_heat_), values(after.theta), old(before.theta);
+        c(contact_heat_), sizes(contact_heat_size_), values(after.theta), old(before.theta);
     const auto at = [](auto&& v, PetscInt i) { return v.size() ? v[i] : 0.0; };
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const double storage = ((*t1)[i] - (*t0)[i]) / in.k, supply = at(*q, i), heating = at(*h, i),
@@ -395,7 +402,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
       const double external = storage + exchange - supply - heating, wall = external + (*flux)[i];
       const double given = std::abs(exchange) + std::abs(supply) + std::abs(heating);
       const double magnitude = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
-                               theta * at(exchange_rows_, i) + w * at(heating_rows_, i);
+                               theta * at(exchange_rows_, i) + at(*sizes, i) + w * at(heating_rows_, i);
       content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
       heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude;

@@ -214,7 +214,8 @@ template <int d>
 void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
   if (!apply) books_.add_rounding(heat_right_);
-  solve_heat(heat_right_, heat_external_, Eigen::VectorXd::Zero(given_flow_.size()), correction_theta_);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
+  solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
        std::max(largest_entry(next_.theta), ledger.temperature_scale));
   if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));

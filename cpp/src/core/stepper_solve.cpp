@@ -174,15 +174,18 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
   return true;
 }
 
-// Heat that the contact leads or makes is known at the contact points alone: as power that a node loses at its
-// temperature, less what comes from the foundation and from friction.
+// Heat that the contact leads or makes is known at the contact points alone: as power that a node loses by what it is
+// warmer than the foundation beside it, less what it receives at that temperature, from friction say. Counted from zero
+// the two would cancel where the contact leads heat well.
 template <int d>
 void Stepper<d>::take_flow(const StepLoads& loads) {
   const auto& shape = surface_.scalar_shape();
   const ContactFlow flow =
       contact_flow(problem_, surface_, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)), free_);
   flow_ = shape.transpose() * flow.conductance.asDiagonal() * shape;
-  given_flow_ = shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation) + flow.friction).eval();
+  beside_ = surface_.nodal_mean(loads.foundation);
+  given_flow_ =
+      shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation - shape * beside_) + flow.friction).eval();
   for (Eigen::Index i = 0; i < given_flow_.size(); ++i)
     if (fixed_contact_[static_cast<std::size_t>(i)]) {  // a held temperature takes any flow
       flow_.row(i).setZero();
@@ -196,13 +199,14 @@ void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
   heat_right_side(loads, heating_w, 1);
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
   if (reactive()) take_flow(loads);
-  solve_heat(heat_right_, heat_external_, given_flow_, next_.theta);
+  solve_heat(heat_right_, heat_external_, given_flow_, beside_, next_.theta);
 }
 
-// The temperatures theta_c of the contact nodes, free - C (flow theta_c - given) + W_c a with the constants a that are
-// solved for apart, are found from a dense linear system, as the contact forces are.
+// The temperatures theta_c = beside + t of the contact nodes, free - C (flow t - given) + W_c a with the constants a
+// that are solved for apart, are found from a dense linear system, as the contact forces are.
 template <int d>
-void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, Vec out) {
+void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside,
+                            Vec out) {
   const Eigen::VectorXd free = heat_->reduce(right);
   const Eigen::Index m = constants_.count();
   const Eigen::VectorXd load = m > 0 ? constants_.load(external, right) : Eigen::VectorXd();
@@ -219,7 +223,7 @@ void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& give
   Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n + m, n + m);
   Eigen::VectorXd loads(n + m);
   system.topLeftCorner(n, n) += compliance * flow_;
-  loads.head(n) = free + compliance * given;
+  loads.head(n) = free - beside + compliance * given;
   if (m > 0) {
     Eigen::MatrixXd along(n, m);
     for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(constants_.along(j));
