@@ -25,10 +25,10 @@ class Trapped:
     def __getattr__(self, name):
         return getattr(self.stepper, name)
 
-    def advance(self, *loads):
+    def advance(self, *loads, **options):
         libm.feclearexcept(TRAPS)
         libm.feenableexcept(TRAPS)
-        report = self.stepper.advance(*loads)
+        report = self.stepper.advance(*loads, **options)
         libm.fedisableexcept(TRAPS)
         return report
 
