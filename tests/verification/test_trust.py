@@ -5,28 +5,18 @@ Each scene was once wrong and passed, or right and stopped. `python test_trust.p
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from boxes import along, elasticity, field, right, scene
+from ranked import Checks, on_two_ranks
 
 import warmslip
 from warmslip import Run
 
 STEEL: dict[str, Any] = {"young": 2e11, "poisson": 0.3}
-Check = Callable[[int], None]
-CHECKS: dict[str, Check] = {}
-
-
-def check(function: Check) -> Check:
-    """Registers a check that takes the dimension."""
-    CHECKS[function.__name__] = function
-    return function
+check = Checks()
 
 
 # ---- wrong and passed ------------------------------------------------------------------------------------------------
@@ -360,26 +350,16 @@ def contact_solver_does_not_give_up(d: int) -> None:
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", CHECKS)
+@pytest.mark.parametrize("name", check.names)
 def test_trust(name: str, d: int) -> None:
-    CHECKS[name](d)
+    check.run(name, d)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("d", [2, 3])
 def test_trust_on_two_ranks(d: int) -> None:
-    from conftest import child_environment
-
-    environment = child_environment() | {"PYTHONPATH": str(Path(__file__).resolve().parents[1])}
-    command = ["mpirun", "-n", "2", sys.executable, str(Path(__file__).resolve()), str(d)]
-    result = subprocess.run(
-        command, env=environment, text=True, capture_output=True, timeout=300, check=False, cwd=Path.cwd()
-    )
-    assert result.returncode == 0, result.stdout + result.stderr
-    assert result.stdout.count(f"{len(CHECKS)} checks hold") == 2
+    on_two_ranks(__file__, d, check)
 
 
 if __name__ == "__main__":
-    for each in CHECKS.values():
-        each(int(sys.argv[1]))
-    print(f"{len(CHECKS)} checks hold", flush=True)
+    check.main()

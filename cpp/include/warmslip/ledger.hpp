@@ -78,7 +78,7 @@ class Bookkeeper {
                    Vec external = nullptr) const;
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
   /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel).
-  void add_rounding(Vec defect) const;
+  void add_rounding(Vec defect, Vec external) const;
 
  private:
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
@@ -99,7 +99,8 @@ class Bookkeeper {
       contact_heat_size_;  // D theta, J theta, heat that leaves at the contact points
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;  // hat functions at the contact points, found anew from positions
-  Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
+  Eigen::VectorXd force_magnitudes_, heat_magnitudes_, force_external_,
+      heat_external_;          // of the rows, zero where they are fixed
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;

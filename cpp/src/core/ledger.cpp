@@ -142,8 +142,7 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
     const Mandel<d> strain = material.elasticity->colPivHouseholderQr().solve(to_mandel<d>(*material.expansion));
     free_expansion_ = std::max(free_expansion_, length * strain.norm());
   }
-  force_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
-  heat_magnitudes_ = Eigen::VectorXd::Zero(layout.owned());
+  force_magnitudes_ = force_external_ = heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
   interpolate_anew();
 }
 
@@ -345,6 +344,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
                    magnitude = moved + given + within + theta * row(expansion_rows_);
       const bool fixed = clamped_[static_cast<std::size_t>(i)];
       force_magnitudes_[i] = fixed ? 0 : magnitude;
+      force_external_[i] = fixed ? 0 : moved + given;
       if (fixed) {
         force.add(position, external - left, magnitude);
         l.support_work += in.k * left.dot(way);
@@ -406,6 +406,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
       content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
       heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude;
+      heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude - theta * conduction_rows_[i];
       if (cooled_[static_cast<std::size_t>(i)]) {
         l.held += in.k * wall * (*values)[i];
       } else {
@@ -474,15 +475,17 @@ void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const S
 }
 
 template <int d>
-void Bookkeeper<d>::add_rounding(Vec defect) const {
+void Bookkeeper<d>::add_rounding(Vec defect, Vec external) const {
   const Eigen::Index block = block_size(defect);
-  const Eigen::VectorXd& magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_;
-  Values values(defect);
+  const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
+                        &outer = block == 1 ? heat_external_ : force_external_;
+  Values values(defect), outer_values(external);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
     for (Eigen::Index a = 0; a < block; ++a) {
       const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
       const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
       (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i];
+      if (external) (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i];
     }
 }
 

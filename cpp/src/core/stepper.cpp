@@ -125,10 +125,10 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   const bool monolithic = this->monolithic();
   const StepInputs inputs = this->inputs(loads, contact);
   books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
-  if (!apply) books_.add_rounding(momentum_right_);
+  if (!apply) books_.add_rounding(momentum_right_, momentum_external_);
   if (monolithic) {
     books_.heat_defect(now_, next_, inputs, heat_right_);
-    if (!apply) books_.add_rounding(heat_right_);
+    if (!apply) books_.add_rounding(heat_right_, nullptr);
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
@@ -213,7 +213,7 @@ void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
 template <int d>
 void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
-  if (!apply) books_.add_rounding(heat_right_);
+  if (!apply) books_.add_rounding(heat_right_, heat_external_);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note(errors_.theta, scales_.theta, largest_entry(correction_theta_),

@@ -1,0 +1,56 @@
+"""Checks that take the dimension, run by pytest on one rank and as a program on several."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from conftest import child_environment
+
+Check = Callable[[int], None]
+
+
+class Checks:
+    """A registry and its decorator."""
+
+    def __init__(self) -> None:
+        self._checks: dict[str, Check] = {}
+
+    def __call__(self, function: Check) -> Check:
+        self._checks[function.__name__] = function
+        return function
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._checks)
+
+    def run(self, name: str, d: int) -> None:
+        self._checks[name](d)
+
+    def main(self) -> None:
+        """All of them, for the dimension that the command line gives."""
+        for name in self.names:
+            self.run(name, int(sys.argv[1]))
+        print(self.verdict, flush=True)
+
+    @property
+    def verdict(self) -> str:
+        return f"{len(self._checks)} checks hold"
+
+
+def on_two_ranks(file: str, d: int, checks: Checks) -> None:
+    """Runs the program `file`, whose `main` is that of `checks`, on two ranks."""
+    environment = child_environment()
+    environment["PYTHONPATH"] = ":".join(filter(None, [str(Path(__file__).parent), environment.get("PYTHONPATH", "")]))
+    result = subprocess.run(
+        ["mpirun", "-n", "2", sys.executable, str(Path(file).resolve()), str(d)],
+        env=environment,
+        text=True,
+        capture_output=True,
+        timeout=300,
+        check=False,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.stdout.count(checks.verdict) == 2
