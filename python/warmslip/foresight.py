@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import plausibility as say
+from warmslip.coupling import coupled
 from warmslip.loads import Array, Formula, evaluate, of_time
 from warmslip.loads import data as read
 from warmslip.materials import cell_regions
@@ -17,7 +18,17 @@ TIMES = 16  # at which data that depend on time are looked at
 
 def before(d: Discretisation) -> list[str]:
     """All that is to be said before the first step. Nothing of functions in Python, which are not asked without need."""
-    return [*([] if "loads" in d.own else say.of_scene(d.scene)), *_gaps(d), *_starts(d)]
+    return [*([] if "loads" in d.own else say.of_scene(d.scene)), *_gaps(d), *_starts(d), *_coupling(d)]
+
+
+def _coupling(d: Discretisation) -> list[str]:
+    """A coupling that makes motion and temperature grow, where the tensors alone say so."""
+    scheme, step = d.scene.time.coupling, d.scene.step
+    found = coupled(d.problem.materials)
+    limits = [one.limit(scheme) for one in found if one.cancels and scheme == "staggered" and one.feeds(step)]
+    out = [say.feeds(step, min(limits))] if limits else []
+    itself = any(one.drives_itself(size(d)) for one in found if not one.cancels)
+    return [*out, say.drives_itself()] if itself else out
 
 
 def _gaps(d: Discretisation) -> list[str]:
