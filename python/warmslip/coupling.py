@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -116,20 +117,23 @@ class Coupled:
             return np.inf
         return staggered_limit(self.a if scheme == "staggered" else self.a / 2, self.f, self.m, self.r, 0.0)
 
-    def feeds(self, step: float) -> bool:
-        """Whether staggered steps grow for R = -c M although inertia and conduction resist, whatever the wave length.
+    def feeds(self, step: float, finest: float) -> bool:
+        """Whether staggered steps grow for R = -c M although inertia and conduction resist.
 
-        A mode of squared wave number q alternates and grows if k c (M : e)^2 exceeds
-        (2 A + k F + 4 rho/(k q)) (1 + k K q/2) in e, which is least, (sqrt(2 A + k F) + sqrt(2 rho K))^2, at one q. A shear wave has
-        twice the inertia of a strain of its size.
+        A mode of squared wave number q, up to the mesh's `finest`, alternates and grows if k c (M : e)^2 exceeds
+        (2 A + k F + 4 rho/(k q)) (1 + k K q/2) in e. Shear has twice the inertia of a strain of its size.
         """
         held = 2 * self.a + step * self.f
         e = np.linalg.lstsq(held, self.m, rcond=None)[0]
-        fed = step * (self.m @ e) ** 2 / self.weight
-        return bool(fed > (np.sqrt(e @ held @ e) + np.sqrt(4 * self.density * self.diffusion * (e @ e))) ** 2)
+        straining, inertia = float(e @ held @ e), 8 * self.density * float(e @ e) / step
+        lost = step * self.diffusion / 2
+        q = (
+            finest if lost * straining == 0 else min(finest, math.sqrt(inertia / (lost * straining)))
+        )  # the least of all
+        return step * float(self.m @ e) ** 2 / self.weight > (straining + inertia / q) * (1 + lost * q)
 
     def drives_itself(self, length: float) -> bool:
-        """Whether F - sym(M x R) is negative for some strain, and stays so with what conduction over `length` takes away.
+        """Whether F - sym(M x R) is negative for some strain, also with what conduction over `length` takes away.
 
         A mode of squared wave number q without inertia grows if M R > F + A K q; inertia only adds to it.
         """

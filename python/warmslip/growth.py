@@ -10,16 +10,17 @@ import numpy as np
 ROOM = 48  # blocks of steps that are remembered
 NOTHING = -700.0  # logarithm of what does not change
 CLIMBS = (
-    (48, 4.4),
-    (40, 4.4),
-    (32, 4.4),
-    (24, 4.4),
-    (16, 4.4),
-    (12, 4.4),
+    (48, 5.5),
+    (40, 5.5),
+    (32, 5.5),
+    (24, 5.5),
+    (16, 5.5),
+    (12, 5.5),
     (8, 9.2),
     (5, 23.0),
 )  # blocks, logarithm of the growth
-STRAIGHT = 0.05  # of the climb
+STRAIGHT = 0.035  # of the climb; 1 + t^5 is never that straight, and constant data give t^4 at most
+DRIVEN = 0.2  # of the climb, beyond which that of the data drives it
 HOT = 0.01  # share of heat below which the coupling has no part in a growth
 
 
@@ -63,8 +64,9 @@ def add(course: dict[str, Any], row: list[float]) -> bool:
 def climb(course: dict[str, Any]) -> dict[str, float] | None:
     """The longest climb at the end of a course of whole blocks, None for none.
 
-    The first entry of a row is the square of what a step changes, the others those of the data: where one of them climbs half as
-    much, the data drive. A polynomial in time, a burst and a wave are not straight. `factor` a step, `total`, steps `begin` and `end`.
+    The first entry of a row is the square of what a step changes, the others are those of the data: where one climbs with
+    it, the data drive. A polynomial in time, a burst and a wave are not straight. `factor` a step, `total`, `begin` and `end`
+    in steps.
     """
     rows, stride = course["rows"], course["stride"]
     for count, least in CLIMBS:
@@ -75,7 +77,7 @@ def climb(course: dict[str, Any]) -> dict[str, float] | None:
         rise = line[-1] - line[0]
         slope, height = np.polyfit(at, line, 1)
         straight = np.abs(line - height - slope * at).max() <= STRAIGHT * rise
-        if straight and line.min() > NOTHING and (last[-1, 1:] - last[0, 1:]).max(initial=0.0) < rise / 2:
+        if straight and line.min() > NOTHING and (last[-1, 1:] - last[0, 1:]).max(initial=0.0) < DRIVEN * rise:
             return {
                 "factor": math.exp(slope / 2 / stride),
                 "total": math.exp(rise / 2),

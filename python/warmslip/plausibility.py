@@ -247,10 +247,13 @@ def impact(shortest: int | None) -> list[str]:
 
 
 def feeds(step: float, limit: float) -> str:
-    """Of a staggered step beyond the limit up to which a coupling R = -c M gives back what it takes."""
+    """Of a staggered step too long for a coupling R = -c M, which below `limit` stands any mesh."""
+    cure = "take time.coupling = 'monolithic', which stands any" + (
+        f", or steps below {limit:.3g}" if limit > 0 else ""
+    )
     return (
-        f"a step of {step:.3g} is beyond the {limit:.3g} up to which staggered steps stand this coupling: temperature and "
-        f"motion may grow from step to step; take steps below {limit:.3g}, or time.coupling = 'monolithic', which stands any"
+        f"a step of {step:.3g} is longer than staggered steps stand with this coupling: temperature and motion may grow from "
+        f"step to step; {cure}"
     )
 
 
@@ -284,8 +287,9 @@ def grown(found: dict[str, float], *, cancels: bool, itself: bool, limit: float)
             "time that half the step keeps is theirs; thermodynamics has R = -T0 M, write heat.heating = { thermodynamic = true }"
         )
     return [
-        f"the coupling feeds the run: what a step changes of temperature and motion grows by a factor of {found['factor']:.4g} a "
-        f"step, {found['total']:.2g} in all from t = {found['begin']:.3g} to {found['end']:.3g}, although nothing drives it; {cure}"
+        f"the coupling feeds the run: what a step changes of temperature and motion grows by a factor of {found['factor']:.4g} "
+        f"a step, {found['total']:.2g} in all from t = {found['begin']:.3g} to {found['end']:.3g}, although nothing drives it; "
+        f"{cure}"
     ]
 
 

@@ -6,6 +6,7 @@ A step costs a few reads of its report. Strains are looked at when the elastic e
 
 from __future__ import annotations
 
+import re
 import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -121,7 +122,7 @@ class Watch:
         """Why a step was not taken, where it is a growth that lasted until then: not what its numbers made of the step."""
         found = self.seen["growth"]
         lasted = bool(found) and found["end"] >= 0.8 * self._job.stepper.time
-        return f"{self.fed()[0]}; in the end: {given}" if lasted else given
+        return f"{self.fed()[0]}; in the end {re.split('[:;]', given)[0]}" if lasted else given
 
     def _phase(self, touching: int) -> None:
         """Counts the steps of a contact that began after an open step; None while one lasts that was there from the start."""
