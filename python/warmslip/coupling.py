@@ -127,10 +127,11 @@ class Coupled:
         e = np.linalg.lstsq(held, self.m, rcond=None)[0]
         straining, inertia = float(e @ held @ e), 8 * self.density * float(e @ e) / step
         lost = step * self.diffusion / 2
-        q = (
-            finest if lost * straining == 0 else min(finest, math.sqrt(inertia / (lost * straining)))
-        )  # the least of all
-        return step * float(self.m @ e) ** 2 / self.weight > (straining + inertia / q) * (1 + lost * q)
+        fed = step * float(self.m @ e) ** 2 / self.weight
+        if inertia == 0:
+            return fed > straining
+        q = min(finest, math.sqrt(inertia / (lost * straining))) if lost * straining > 0 else finest  # the least of all
+        return fed > (straining + inertia / q) * (1 + lost * q)
 
     def drives_itself(self, length: float) -> bool:
         """Whether F - sym(M x R) is negative for some strain, also with what conduction over `length` takes away.
