@@ -52,13 +52,13 @@ class Ran:
     seconds: float = 0.0
 
 
-def run(scene: Scene) -> Ran:
+def run(scene: Scene, backend: str = "automatic") -> Ran:
     """Runs a scene, in memory. Refusals and failures become outcomes: `refused`, `crash`."""
     from warmslip.runner import Run
 
     began = time.perf_counter()
     try:
-        job = Run(scene)
+        job = Run(scene, backend=backend)
     except (SceneError, ValueError) as error:
         return Ran("refused", str(error).replace("\n", " "), seconds=time.perf_counter() - began)
     ran, surface = Ran(""), job.discretisation.surface
