@@ -20,7 +20,7 @@ STATED = {
     "flat_and_soft",
     "flat_monolithic",
 }  # to the digits that the run states; all others to 1e-6
-RANKS = ["free_expanding", "gauss_2_moving_support", "regularised_strong", "slender", "solid_gauss"]
+RANKS = ["free_warm", "gauss_2_moving_support", "regularised_steep", "slender", "solid_gauss"]
 
 
 def well(name: str, ran: judge.Ran) -> None:
