@@ -15,11 +15,8 @@ from warmslip.trajectory import Trajectory
 
 FOLDER = Path(__file__).parents[1] / "campaign/scenes"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
-STATED = {
-    "flat_and_sliding",
-    "flat_and_soft",
-    "flat_monolithic",
-}  # to the digits that the run states; all others to 1e-6
+# judged by the digits that the run states; all others to 1e-6
+STATED = {"thin_and_sliding", "thin_and_soft", "thin_monolithic"}
 RANKS = ["free_warm", "gauss_2_moving_support", "regularised_steep", "slender", "solid_gauss"]
 
 
