@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -450,6 +451,27 @@ def test_a_climb_is_straight(square: Any, climbs: bool) -> None:
         if growth.add(course, [growth.log(square(n))]) and (climb := growth.climb(course)):
             found.append(climb)
     assert bool(found) == climbs and len(course["rows"]) <= growth.ROOM and growth.fits(course)
+
+
+def test_a_full_course_keeps_the_largest_of_two() -> None:
+    course = growth.start()
+    for n in range(growth.ROOM + 1):
+        growth.add(course, [float(n), -float(n)])
+    assert course["stride"] == 2 and course["count"] == 1 and len(course["rows"]) == growth.ROOM / 2 + 1
+    assert course["rows"][:2] == [[1.0, 0.0], [3.0, -2.0]] and course["rows"][-1] == [growth.ROOM, -growth.ROOM]
+
+
+@pytest.mark.parametrize(("mechanical", "told"), [(0.0, True), (1.0, True), (1e3, False)])
+def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bool) -> None:
+    """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
+    job = warmslip.Run(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
+    for n in range(60):
+        heat = 1.2**n
+        ledger = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
+        job.watch._growth(ledger, [])
+    assert bool(job.watch.fed()) == told
+    share = job.watch.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
+    assert share == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_climb_of_the_data_is_no_growth() -> None:
