@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import plausibility as say
+from warmslip.coupling import coupled
 from warmslip.loads import Array, Formula, evaluate, of_time
 from warmslip.loads import data as read
 from warmslip.materials import cell_regions
@@ -17,7 +18,18 @@ TIMES = 16  # at which data that depend on time are looked at
 
 def before(d: Discretisation) -> list[str]:
     """All that is to be said before the first step. Nothing of functions in Python, which are not asked without need."""
-    return [*([] if "loads" in d.own else say.of_scene(d.scene)), *_gaps(d), *_starts(d)]
+    return [*([] if "loads" in d.own else say.of_scene(d.scene)), *_gaps(d), *_starts(d), *_coupling(d)]
+
+
+def _coupling(d: Discretisation) -> list[str]:
+    """A coupling that makes motion and temperature grow, where the tensors alone say so."""
+    scheme, step = d.scene.time.coupling, d.scene.step
+    found = coupled(d.problem.materials)
+    finest = (np.pi * float(np.linalg.norm(gradients(_corners(d)), axis=-1).max())) ** 2 if found else 0.0
+    limits = [one.limit(scheme) for one in found if one.cancels and scheme == "staggered" and one.feeds(step, finest)]
+    out = [say.feeds(step, min(limits))] if limits else []
+    itself = any(one.drives_itself(size(d)) for one in found if not one.cancels)
+    return [*out, say.drives_itself()] if itself else out
 
 
 def _gaps(d: Discretisation) -> list[str]:
@@ -79,6 +91,11 @@ def size(d: Discretisation) -> float:
     return float(np.ptp(np.asarray(d.mesh.nodes), axis=0).max())
 
 
+def _corners(d: Discretisation) -> Array:
+    corners: Array = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
+    return corners
+
+
 def gradients(corners: Array) -> Array:
     """Gradients of the barycentric coordinates of simplices with `corners` (cells, d+1, d), (cells, d+1, d), 1/length."""
     inner = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
@@ -92,7 +109,7 @@ def _first_cell(d: Discretisation, part: str) -> tuple[float, float, float]:
     at = np.flatnonzero(on.sum(axis=1) == d.dim)
     if not len(at):
         return 0.0, 1.0, 0.0
-    slopes = gradients(np.asarray(d.mesh.nodes)[cells[at]])
+    slopes = gradients(_corners(d)[at])
     height = 1 / np.linalg.norm(slopes[~on[at]], axis=1)
     of_cell = cell_regions(d.scene, d.mesh)
     regions = of_cell[at] if len(of_cell) else np.zeros(len(at), dtype=int)

@@ -126,6 +126,13 @@ class LoadVectors:
         self._kept: dict[str, Array] = {}
         self._try(scene.step)
 
+    @property
+    def of_time(self) -> bool:
+        """Whether any datum changes in time."""
+        given = [*self._loads.displacement.values(), *self._loads.temperature.values()]
+        given += [self._loads.on_contact(name, i) for i in self._points for name in ON_CONTACT]
+        return bool(self._moving) or any(map(of_time, given))
+
     def _try(self, t: float) -> None:
         """Calls the functions in Python of the first step: one that is wrong is refused here, and not the outcome of a run."""
         for mechanical, rule, data, what in self._moving:

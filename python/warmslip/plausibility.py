@@ -246,6 +246,53 @@ def impact(shortest: int | None) -> list[str]:
     ]
 
 
+def feeds(step: float, limit: float) -> str:
+    """Of a staggered step too long for a coupling R = -c M, which below `limit` stands any mesh."""
+    cure = "take time.coupling = 'monolithic', which stands any" + (
+        f", or steps below {limit:.3g}" if limit > 0 else ""
+    )
+    return (
+        f"a step of {step:.3g} is longer than staggered steps stand with this coupling: temperature and motion may grow from "
+        f"step to step; {cure}"
+    )
+
+
+def drives_itself() -> str:
+    """Of a coupling whose F - sym(M x R) is negative for some strain."""
+    return (
+        "heat.heating warms what heat.expansion stretches by more than the elasticity holds: some strain drives itself, in the "
+        "equations as in the run, whatever the step; thermodynamics has R = -T0 M, write "
+        "heat.heating = { thermodynamic = true }"
+    )
+
+
+def grown(found: dict[str, float], *, cancels: bool, itself: bool, limit: float) -> list[str]:
+    """Of a growth, `factor` a step and `total` from time `begin` to `end`, that nothing drives; empty for none.
+
+    `cancels` is R = -c M, stable up to the step `limit`; `itself` says that some strain drives itself.
+    """
+    if not found:
+        return []
+    if cancels:
+        cure = "take time.coupling = 'monolithic', with which nothing grows"
+        cure += f", or steps below {limit:.3g}" if limit > 0 else ""
+    elif itself:
+        cure = (
+            "so do the equations, whose heat.heating warms a strain by more than the elasticity holds, and no step is short "
+            "enough; thermodynamics has R = -T0 M, write heat.heating = { thermodynamic = true }"
+        )
+    else:
+        cure = (
+            "the equations themselves may grow, as heat.heating is no negative multiple of heat.expansion: a growth over "
+            "time that half the step keeps is theirs; thermodynamics has R = -T0 M, write heat.heating = { thermodynamic = true }"
+        )
+    return [
+        f"the coupling feeds the run: what a step changes of temperature and motion grows by a factor of {found['factor']:.4g} "
+        f"a step, {found['total']:.2g} in all from t = {found['begin']:.3g} to {found['end']:.3g}, although nothing drives it; "
+        f"{cure}"
+    ]
+
+
 def beyond(low: dict[str, float], high: dict[str, float], nodes: int, cure: str) -> list[str]:
     """Of temperatures below and above what the data allow: `bound`, `value` farthest from it, `count`, `time`; empty for none."""
     out = []

@@ -140,13 +140,13 @@ class Run:
                 known = {
                     name: value for name, value in residuals(report).items() if value == value
                 }  # nan: not computed
-                self.failure = {"step": n, "reason": wrong or report.reason} | known
+                self.failure = {"step": n, "reason": wrong or self.watch.reason(report.reason)} | known
                 if errors := estimates(report):
                     self.failure["digits"] = summary.digits(errors)
                 log.info("step %d was not taken: %s", n, self.outcome)
                 return
             self.report = report
-            self.watch.step(report, n)
+            self.watch.step(report, n, loads)
             for name, value in residuals(report).items():
                 self.worst[name] = worse(self.worst[name], value)
             for name, value in estimates(report).items():

@@ -6,13 +6,16 @@ A step costs a few reads of its report. Strains are looked at when the elastic e
 
 from __future__ import annotations
 
+import re
 import weakref
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warmslip import growth
 from warmslip import plausibility as say
+from warmslip.coupling import coupled
 from warmslip.foresight import TIMES, before, size
 from warmslip.loads import Formula, evaluate, of_time
 from warmslip.loads import data as read
@@ -38,23 +41,32 @@ class Watch:
             "shortest": None,
             "low": {},
             "high": {},
+            "growth": {},
+            "course": growth.start(),
         }
+        scheme = job.scene.time.coupling
+        both = coupled(self._d.problem.materials) if job.scene.moves and job.scene.heat is not None else []
+        self._coupled = [] if scheme == "monolithic" and all(one.cancels for one in both) else both
+        self._driven = bool(self._coupled) and self._d.load_vectors.of_time
+        self._given: list[float] = []  # norms of the data of the last step
 
     def fits(self, seen: Any) -> bool:
         """Whether what a checkpoint holds is what a watch remembers."""
         if not isinstance(seen, dict) or seen.keys() != self.seen.keys():
             return False
-        numbers = [value for name, value in seen.items() if name not in ("low", "high", "phase", "shortest")]
+        apart = ("low", "high", "phase", "shortest", "growth", "course")
+        numbers = [value for name, value in seen.items() if name not in apart]
         numbers += [seen[name] for name in ("phase", "shortest") if seen[name] is not None]
-        for name in ("low", "high"):
+        beyond = {"bound", "value", "count", "time"}
+        for name, keys in (("low", beyond), ("high", beyond), ("growth", {"factor", "total", "begin", "end"})):
             found = seen[name]
-            if not isinstance(found, dict) or (found and found.keys() != {"bound", "value", "count", "time"}):
+            if not isinstance(found, dict) or (found and found.keys() != keys):
                 return False
             numbers += found.values()
-        return all(type(value) in (int, float) for value in numbers)
+        return all(type(value) in (int, float) for value in numbers) and growth.fits(seen["course"])
 
-    def step(self, report: Any, n: int) -> None:
-        """After step n (collective when it looks at a field)."""
+    def step(self, report: Any, n: int, data: Any) -> None:
+        """After step n with its data (collective when it looks at a field)."""
         seen = self.seen
         if self._law:
             touching = report.stick + report.slip
@@ -64,12 +76,53 @@ class Watch:
                 seen["penetration"] = report.max_penetration
             if self._impacts:
                 self._phase(touching)
+        if self._coupled:
+            self._growth(report.ledger, data)
         if n & (n - 1) == 0:
             self._temperatures()
         energy = report.ledger.elastic
         if energy > 4 * seen["energy"] and n - seen["looked"] >= self._job.scene.time.steps / 4:
             seen["energy"], seen["looked"] = energy, n
             self._strain()
+
+    def _growth(self, ledger: Any, data: Any) -> None:
+        """Looks for a climb of the energy of what a step changes, which is backward Euler's own dissipation.
+
+        Without a change of data that energy falls in every step that does not grow, for R = -c M by theorem.
+        """
+        heat = max(one.weight for one in self._coupled) * ledger.heat_damping
+        square = ledger.inertia_damping + ledger.elastic_damping + heat
+        row = [growth.log(square), *self._changes(data)]
+        if not growth.add(self.seen["course"], row) or not heat >= growth.HOT * square:
+            return
+        found = growth.climb(self.seen["course"])
+        if found and found["total"] >= self.seen["growth"].get("total", 0.0):
+            step = self._job.scene.step
+            self.seen["growth"] = found | {name: found[name] * step for name in ("begin", "end")}
+
+    def _changes(self, data: Any) -> list[float]:
+        """Logarithms of the squares of how much the norms of the data changed, none where all are constant."""
+        if not self._driven:
+            return []
+        given = [
+            0.0 if one is None else float(one.norm() if hasattr(one, "norm") else np.linalg.norm(one)) for one in data
+        ]
+        before, self._given = self._given or given, given
+        return [growth.log((now - last) ** 2) for now, last in zip(given, before, strict=True)]
+
+    def fed(self) -> list[str]:
+        """What is to be said of a growth."""
+        scene = self._job.scene
+        limits = [one.limit(scene.time.coupling) for one in self._coupled if one.cancels]
+        itself = any(one.drives_itself(size(self._d)) for one in self._coupled if not one.cancels)
+        cancels = len(limits) == len(self._coupled)
+        return say.grown(self.seen["growth"], cancels=cancels, itself=itself, limit=min(limits, default=0.0))
+
+    def reason(self, given: str) -> str:
+        """Why a step was not taken, where it is a growth that lasted until then: not what its numbers made of the step."""
+        found = self.seen["growth"]
+        lasted = bool(found) and found["end"] >= 0.8 * self._job.stepper.time
+        return f"{self.fed()[0]}; in the end {re.split('[:;]', given)[0]}" if lasted else given
 
     def _phase(self, touching: int) -> None:
         """Counts the steps of a contact that began after an open step; None while one lasts that was there from the start."""
@@ -147,7 +200,7 @@ class Watch:
         self._strain()
         self._temperatures()
         seen, heat = self.seen, self._job.scene.heat
-        out = [*before(self._d), *say.strained(seen["strain"])]
+        out = [*before(self._d), *self.fed(), *say.strained(seen["strain"])]
         if self._law:
             out += self._contact()
         nodes = len(self._d.mesh.nodes)

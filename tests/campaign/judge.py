@@ -33,6 +33,7 @@ from warmslip.scene import Scene, SceneError, build
 TOLERANCE = 1e-6  # of a field, relative to its largest value in the run
 HELD = 1e-9  # doubles can hold an answer that one unit in the last place of the data moves by no more
 DATA = 1e3  # such units an answer may be off
+SLIP = 1e-9  # of the speed; TOLERANCE of it is 1e-15, which a velocity in doubles has no better
 FIELDS = ("u", "w", "theta", "force", "stress")
 LEFT = ("momentum", "heat", "supports", "motion", "law")
 
@@ -51,13 +52,13 @@ class Ran:
     seconds: float = 0.0
 
 
-def run(scene: Scene) -> Ran:
+def run(scene: Scene, backend: str = "automatic") -> Ran:
     """Runs a scene, in memory. Refusals and failures become outcomes: `refused`, `crash`."""
     from warmslip.runner import Run
 
     began = time.perf_counter()
     try:
-        job = Run(scene)
+        job = Run(scene, backend=backend)
     except (SceneError, ValueError) as error:
         return Ran("refused", str(error).replace("\n", " "), seconds=time.perf_counter() - began)
     ran, surface = Ran(""), job.discretisation.surface
@@ -159,7 +160,7 @@ class Judge:
 
     def scales(self, fields: dict[str, list[Any]]) -> dict[str, float]:
         """The largest value of each field in the run; a velocity counts with the displacement, a stress with what the
-        rounding of the displacements makes of it."""
+        rounding of the displacements makes of it, a temperature with what that of the slip makes of the heat of friction."""
         out = {
             name: max((float(np.abs(floats(x)).max(initial=0.0)) for x in values), default=0.0)
             for name, values in fields.items()
@@ -171,7 +172,16 @@ class Judge:
             if table is not None and self.moves:
                 tensor = float(np.abs(floats(isotropic(table, self.scheme.d))).max())
                 out["stress"] = max(out["stress"], 1e-8 * tensor * strain * size)
+        out["theta"] = max(out["theta"], self.rubbed(out["force"], out["w"]))
         return out
+
+    def rubbed(self, force: float, w: float) -> float:
+        """The temperature that one step of friction makes of SLIP of the largest speed under the largest force."""
+        share = max((c.friction_heating.share for c in self.scene.contacts if c.friction_heating), default=0.0)
+        if share == 0:
+            return 0.0
+        nodal = floats(self.scheme.forms.storage).sum(axis=1)
+        return SLIP * share * force * w * float(self.scheme.k) / float(nodal.min())
 
     @staticmethod
     def apart(one: dict[str, list[Any]], other: dict[str, list[Any]], scales: dict[str, float]) -> dict[str, float]:

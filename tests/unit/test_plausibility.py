@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from conftest import Command
 
 import warmslip
-from warmslip import Loads, Scene, estimate, explain, plausibility
+from warmslip import Loads, Scene, estimate, explain, growth, plausibility
 from warmslip.problem import Discretisation, discretise, make_mesh
 from warmslip.scene import build, library
 
@@ -45,6 +46,24 @@ KELVIN = {
     "initial": {"temperature": 293.0},
     "supports": {"temperature": {"top": 300.0}, "displacement": ["top"]},
     "contact": None,
+}
+
+STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
+COUPLED: dict[
+    str, Any
+] = {  # a column, as in test_long_runs, in steps of 0.54 where 0.533 is the longest that staggered ones stand
+    "mesh": {"shape": "square", "n": 4},
+    "time": {"end": 162.0, "steps": 300},
+    "elasticity": {"lame": [0.0, 0.75]},
+    "viscosity": {"lame": [0.0, 1.0]},
+    "heat": {
+        "conductivity": 1e-6,
+        "capacity": 1.0,
+        "expansion": STRETCHED,
+        "heating": {"tensor": [[0.0, 0.0], [0.0, -3.0]]},
+    },
+    "supports": {"displacement": ["top"]},
+    "initial": {"temperature": 1e-5},
 }
 
 
@@ -124,6 +143,16 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
         "temperatures start with a jump of 20 on 'top', and a step of 1 is 64 times the 0.016 in which it leaves the first cell",
     ),
     (body(WARM, supports__temperature={"top": 20.0}, time__end=10.0), None),
+    (body(COUPLED), "a step of 0.54 is longer than staggered steps stand with this coupling"),
+    (body(COUPLED, time__end=159.0), None),
+    (body(COUPLED, time__coupling="monolithic"), None),
+    (body(COUPLED, inertia={"density": 1e3}), None),  # too heavy to follow
+    (body(COUPLED, heat__conductivity=1.0, inertia={"density": 1.0}), None),  # and heat too quick
+    (
+        body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, 0.51]]}),
+        "heat.heating warms what heat.expansion stretches",
+    ),
+    (body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, 0.49]]}), None),
 ]
 
 
@@ -384,6 +413,92 @@ def test_a_resumed_run_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
     again = warmslip.run(scene, out=tmp_path, resume=True)
     assert again.right and again.summary["warnings"] == whole
+
+
+def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What each step has changed is in the checkpoint too."""
+    from warmslip import interruption
+
+    scene = body(COUPLED, output__checkpoint=20, time={"end": 108.0, "steps": 200})
+    whole = warnings(scene)
+    assert any(one.startswith("the coupling feeds the run") for one in whole)
+    asked: list[int] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(interruption.Interruption, "agreed", lambda *_: (asked.append(1) or len(asked) == 175, False))
+        assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
+    again = warmslip.run(scene, out=tmp_path, resume=True)
+    assert again.right and again.summary["warnings"] == whole
+
+
+@pytest.mark.parametrize(
+    ("square", "climbs"),
+    [
+        (lambda n: 1.05**n, True),
+        (lambda n: 1e-30 * 1.5**n, True),
+        (lambda n: 1 + 1e-3 * 1.2**n, True),
+        (lambda n: 1.05**n * (2 + np.sin(n)), True),
+        (lambda n: n**5, False),
+        (lambda n: 1 + 1e-3 * n**4, False),
+        (lambda n: 1e10 if n > 150 else 1e-10, False),
+        (lambda n: 1e10 if n % 40 == 0 else 1.0, False),
+        (lambda n: 1e-300 if n < 150 else np.exp(-1e3 / (n - 149)), False),
+        (lambda n: 0.0, False),
+    ],
+)
+def test_a_climb_is_straight(square: Any, climbs: bool) -> None:
+    course, found = growth.start(), []
+    for n in range(1, 301):
+        if growth.add(course, [growth.log(square(n))]) and (climb := growth.climb(course)):
+            found.append(climb)
+    assert bool(found) == climbs and len(course["rows"]) <= growth.ROOM and growth.fits(course)
+
+
+def test_a_full_course_keeps_the_largest_of_two() -> None:
+    course = growth.start()
+    for n in range(growth.ROOM + 1):
+        growth.add(course, [float(n), -float(n)])
+    assert course["stride"] == 2 and course["count"] == 1 and len(course["rows"]) == growth.ROOM / 2 + 1
+    assert course["rows"][:2] == [[1.0, 0.0], [3.0, -2.0]] and course["rows"][-1] == [growth.ROOM, -growth.ROOM]
+
+
+@pytest.mark.parametrize(("mechanical", "told"), [(0.0, True), (1.0, True), (1e3, False)])
+def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bool) -> None:
+    """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
+    job = warmslip.Run(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
+    for n in range(60):
+        heat = 1.2**n
+        ledger = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
+        job.watch._growth(ledger, [])
+    assert bool(job.watch.fed()) == told
+    share = job.watch.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
+    assert share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_climb_of_the_data_is_no_growth() -> None:
+    for pace, grows in ((0.0, True), (0.001, True), (0.05, False)):
+        course, found = growth.start(), []
+        for n in range(300):
+            growth.add(course, [0.05 * n, pace * n, 3.0])
+            found.append(growth.climb(course))
+        assert any(found) == grows
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        None,
+        {},
+        {"rows": 1},
+        {"rows": [1]},
+        {"rows": [["a"]]},
+        {"rows": [[1.0], [1.0, 2.0]]},
+        {"rows": [[1.0]] * 49},
+        {"count": None},
+        {"stride": "1"},
+    ],
+)
+def test_a_torn_course_fits_nothing(broken: Any) -> None:
+    assert not growth.fits(growth.start() | broken if broken else broken)
 
 
 @pytest.mark.mpi

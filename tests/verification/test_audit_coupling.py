@@ -10,17 +10,12 @@ from scipy.optimize import brentq
 
 import warmslip
 from warmslip import Scene
+from warmslip.coupling import adiabatic_stiffness, coupling_rate, mandel_vector, staggered_limit
 from warmslip.problem import discretise
 from warmslip.runner import Run
 from warmslip.verify.audit import examine
 from warmslip.verify.audit_constants import decay_rate
-from warmslip.verify.audit_coupling import (
-    adiabatic_stiffness,
-    coupling_rate,
-    lagged_margin,
-    mandel_vector,
-    staggered_limit,
-)
+from warmslip.verify.audit_coupling import lagged_margin
 from warmslip.verify.audit_report import Finding, find
 from warmslip.verify.audit_runs import energy
 from warmslip.verify.closed import bench

@@ -160,6 +160,30 @@ def test_judge_sees_a_fault(name: str) -> None:
     assert row["class"] == "silently_wrong", row
 
 
+def test_judge_sees_a_fault_in_the_heat_of_friction() -> None:
+    """What the judge allows for rounding of the slip is far below any heat that slip makes, and above what sticking makes."""
+    rubbed = scene(
+        HEAT
+        | {
+            "heat.source": 0.0,
+            "heat.heating": None,
+            "loads.heat_flux": {},
+            "initial.temperature": 0.0,
+            "contact.heat_exchange": None,
+            "contact.friction_heating": {"share": 0.5},
+        }
+    )
+    assert verdict(rubbed, judge.run(rubbed))["class"] == "right"
+    row = verdict(rubbed, judge.run(rubbed.override(**{"contact.friction_heating.share": 0.50001})))
+    assert row["class"] == "silently_wrong" and row["error_theta"] == pytest.approx(2e-5, rel=0.01)
+    held = rubbed.override(
+        **{"contact.friction.coefficient": 1e3, "initial.velocity": None, "initial.displacement": None}
+    )
+    ran = judge.run(held)
+    assert max(np.abs(one["theta"]).max() for one in ran.states) <= 1e-9
+    assert verdict(held, ran)["class"] == "right"
+
+
 @pytest.mark.parametrize("field", judge.FIELDS)
 def test_judge_sees_a_wrong_field(field: str) -> None:
     right = scene(HEAT)

@@ -14,17 +14,11 @@ from mpi4py import MPI
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from warmslip.coupling import ZERO
 from warmslip.loads import Array
 from warmslip.problem import Discretisation, discretise
 
 DENSE = 150  # unknowns up to which LAPACK is quicker than Lanczos
-ZERO = 1e-12  # relative: an eigenvalue below is round-off
-
-
-def bounds(tensor: Array) -> tuple[float, float]:
-    """Smallest and largest eigenvalue of a symmetric matrix; for a Mandel form, m and M of (H1) and (H2)."""
-    values = np.linalg.eigvalsh(tensor)
-    return float(values[0]), float(values[-1])
 
 
 def trace_constants(d: Discretisation) -> tuple[float, float]:

@@ -36,66 +36,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.optimize import brentq
 
+from warmslip.coupling import (
+    ZERO,
+    adiabatic_stiffness,
+    bounds,
+    coupling_rate,
+    mandel_vector,
+    parts,
+    ratio,
+    staggered_limit,
+)
 from warmslip.loads import Array
 from warmslip.problem import Discretisation
-from warmslip.verify.audit_constants import ZERO, bounds, decay_rate
+from warmslip.verify.audit_constants import decay_rate
 from warmslip.verify.audit_report import Finding, verdict
-
-
-def mandel_vector(tensor: Array) -> Array:
-    """A symmetric (d, d) tensor as a Mandel vector (d (d + 1) / 2) in the core's order: 11, 22, (33, 23, 13,) 12."""
-    i, j = np.triu_indices(len(tensor), 1)
-    return np.concatenate([np.diag(tensor), np.sqrt(2) * tensor[i, j][::-1]])
-
-
-def ratio(m: Array, r: Array) -> float:
-    """c with R = c M, nan if there is none or M = 0; Mandel vectors."""
-    if not m.any():
-        return float("nan")
-    c = float(m @ r / (m @ m))
-    return c if np.linalg.norm(r - c * m) <= ZERO * np.linalg.norm(r) else float("nan")
-
-
-def adiabatic_stiffness(f: Array, m: Array, r: Array) -> float:
-    """Smallest eigenvalue of F - sym(M x R), stress; F a Mandel form, M and R Mandel vectors."""
-    return bounds(f - (np.outer(m, r) + np.outer(r, m)) / 2)[0]
-
-
-def coupling_rate(a: Array, m: Array, r: Array) -> float:
-    """W of (2), one over time: 0 where the coupling is one-sided or R = -c M, infinite without viscosity."""
-    if not m.any() or not r.any() or ratio(m, r) < 0:
-        return 0.0
-    if bounds(a)[0] <= ZERO * bounds(a)[1]:
-        return float("inf")
-    mm, mr, rr = m @ np.linalg.solve(a, m), m @ np.linalg.solve(a, r), r @ np.linalg.solve(a, r)
-    return float((np.sqrt(mm * rr) + mr) / 2)
-
-
-def staggered_limit(a: Array, f: Array, m: Array, r: Array, rate: float) -> float:
-    """The largest k that satisfies (3), time; infinite if every k does, 0 if none is proved to. `rate` is lambda_1."""
-    if not m.any() or not r.any():
-        return float("inf")
-    damping, (load, _) = 2 * a, _parts(a, m, r)
-    if not ratio(m, r) < 0:
-        if rate <= 0 or coupling_rate(a, m, r) > rate:
-            return 0.0
-        g = _weight(a, m, r)
-        n = m + g * r
-        damping = damping - np.outer(n, n) / (2 * g * rate)
-
-    def margin(s: float) -> float:  # s = 1/k; concave, and not decreasing because damping >= 0
-        return bounds(s * damping + f - load)[0]
-
-    least, most = bounds(damping)
-    slack = ZERO * max(bounds(load)[1], bounds(f)[1])
-    if margin(0.0) >= -slack:
-        return float("inf")
-    if most <= 0:
-        return 0.0
-    enough = 2 * bounds(load)[1] / (least if least > ZERO * most else ZERO * most)
-    return 1 / float(brentq(margin, 0.0, enough, xtol=1e-300, rtol=1e-14)) if margin(enough) > 0 else 0.0
 
 
 def lagged_margin(a: Array, f: Array, m: Array, r: Array, rate: float, k: float) -> float:
@@ -104,19 +59,7 @@ def lagged_margin(a: Array, f: Array, m: Array, r: Array, rate: float, k: float)
         return bounds(a)[0]
     if rate <= 0:
         return -float("inf")
-    return bounds(a + k / 2 * f - sum(_parts(a, m, r)) / (2 * rate))[0]
-
-
-def _weight(a: Array, m: Array, r: Array) -> float:
-    """g = |M|/|R| in the metric of A^-1, which for R = -c M is 1/c in any."""
-    if bounds(a)[0] <= ZERO * bounds(a)[1]:
-        return float(np.linalg.norm(m) / np.linalg.norm(r))
-    return float(np.sqrt((m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
-
-
-def _parts(a: Array, m: Array, r: Array) -> tuple[Array, Array]:
-    g = _weight(a, m, r)
-    return np.outer(m, m) / g, g * np.outer(r, r)
+    return bounds(a + k / 2 * f - sum(parts(a, m, r)) / (2 * rate))[0]
 
 
 def coupling(d: Discretisation) -> Iterator[Finding]:

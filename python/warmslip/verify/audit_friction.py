@@ -31,10 +31,9 @@ from scipy.linalg import orth, pinvh
 from scipy.spatial import cKDTree
 
 from warmslip import _core
+from warmslip.coupling import ZERO, mandel_vector, ratio
 from warmslip.loads import Array
 from warmslip.problem import Discretisation
-from warmslip.verify.audit_constants import ZERO
-from warmslip.verify.audit_coupling import mandel_vector, ratio
 from warmslip.verify.audit_report import Finding, verdict
 
 NEAR = 12  # facets looked at for a contact point, nearest centroids first

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from warmslip.coupling import ZERO, bounds
 from warmslip.loads import Array, evaluate
 from warmslip.problem import Discretisation
-from warmslip.verify.audit_constants import ZERO, bounds, trace_constants
+from warmslip.verify.audit_constants import trace_constants
 from warmslip.verify.audit_report import Finding, verdict
 
 SAMPLES = 17  # times at which data that may depend on time are looked at

@@ -17,13 +17,13 @@ import numpy as np
 
 import warmslip
 from warmslip import _core
+from warmslip.coupling import mandel_vector
 from warmslip.problem import discretise
 from warmslip.rates import entitled, observed
 from warmslip.runner import Run
 from warmslip.scene import FullScene
 from warmslip.study import study
 from warmslip.verify.audit import examine
-from warmslip.verify.audit_coupling import mandel_vector
 from warmslip.verify.audit_report import find
 from warmslip.verify.line import Line, below, order
 
