@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
@@ -106,7 +107,7 @@ class ContactPoints:
         order = np.concatenate([np.arange(n) * d, np.delete(np.arange(n * d), np.arange(n) * d)])
         a = turned[np.ix_(order, order)]
         a[range(n), range(n)] += 1 / (self.weights * self.stiffness * self.step)
-        return a
+        return np.asarray(a)
 
 
 def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
@@ -165,7 +166,9 @@ class _Form:
         tangential = (a[n:, n:] + a[n:, n:].T) / 2
         values, vectors = eigh(tangential)
         base = np.eye(len(a))
-        if values[0] <= 1e-12 * values[-1]:  # forces of Gauss points that move nothing: both sides vanish there if q = 1
+        if (
+            values[0] <= 1e-12 * values[-1]
+        ):  # forces of Gauss points that move nothing: both sides vanish there if q = 1
             self._free = False
             seen = vectors[:, values > 1e-12 * values[-1]]
             base = np.block([[np.eye(n), np.zeros((n, seen.shape[1]))], [np.zeros((len(seen), n)), seen]])
@@ -182,7 +185,7 @@ class _Form:
         return (left + left.T) / 2, right / 2
 
     def at(self, p: Array, q: Array, t: Array) -> tuple[float, float, Array]:
-        """The bound by weights (points,), t over the points' own compliance; what to minimise, and its slope by their logarithms."""
+        """The bound by weights (points,), t over a point's own compliance; what to minimise; its slope by their logarithms."""
         n, (left, right) = self._n, self._sides(p, q, t)
         try:
             values, vectors = eigh(right, left, subset_by_index=[max(self.size - TOP, 0), self.size - 1])
@@ -222,7 +225,8 @@ def _largest(right: Array, factor: Array) -> float:
     """The largest eigenvalue of L^-1 right L^-T by Lanczos's method, to 1e-6."""
 
     def apply(x: Array) -> Array:
-        return solve_triangular(factor, right @ solve_triangular(factor, x, lower=True, trans="T"), lower=True)
+        half = solve_triangular(factor, x, lower=True, trans="T")
+        return np.asarray(solve_triangular(factor, right @ half, lower=True))
 
     operator = LinearOperator(right.shape, matvec=apply, dtype=float)
     start = np.ones(len(right))
@@ -331,7 +335,7 @@ def solutions(points: ContactPoints, free: Array, penetration: Array) -> list[So
     return [_told(points, force, np.asarray(free, dtype=float)) for force in forces]
 
 
-def _lawful(a: Array, drive: Array, mu: Array, statuses: Array) -> Array:
+def _lawful(a: Array, drive: Array, mu: Array, statuses: Any) -> Array:
     """Forces (solutions, 2 points) under which the given statuses (many, points) satisfy the law; see `operator`.
 
     Statuses are open, stick, and slip along and against the tangent. A closed point has (A lambda)_n = drive_n, one that sticks
