@@ -103,7 +103,12 @@ void bind(py::module_& m) {
           "contact_free", [](const S& s) { return s.posed().free; },
           "(d points), velocity without contact force in the step tried last, rigid motions apart")
       .def_property_readonly(
-          "contact_rigid", [](const S& s) { return s.posed().rigid; },
+          "contact_rigid",
+          [](const S& s) -> Eigen::VectorXd {  // what is posed leaves out what the known force balances
+            const auto& posed = s.posed();
+            if (posed.known_force.size() == 0 || posed.rigid.size() == 0) return posed.rigid;
+            return posed.rigid + s.contact_solver()->coupling().motions.transpose() * posed.known_force;
+          },
           "(motions), load on the rigid motions in the step tried last")
       .def_property_readonly(
           "contact_penetration",

@@ -38,6 +38,7 @@ SMALL, DENSE = (
     600,
 )  # unknowns up to which Lanczos's method is not worth it; and up to which points have weights of their own
 TRIES, TOP, SHARP, WORST = 120, 8, 40.0, 1e3
+LARGEST = 16.0  # logarithm of a weight, where the bound grows beyond all limits
 COARSE = tuple(sorted(itertools.product((1.0, 4.0, 16.0, 64.0), (0.25, 1.0, 4.0, 16.0, 64.0, 256.0)), key=sum))  # p, t
 
 
@@ -159,7 +160,14 @@ def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
 
     tries = int(TRIES * min(1.0, (2 * DENSE / 3 / form.size) ** 2))
     first = np.repeat(np.log([start[0], 1.0, start[1]]), n)
-    minimize(target, first, jac=True, method="L-BFGS-B", options={"maxfun": tries, "maxcor": 20})
+    minimize(
+        target,
+        first,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(-LARGEST, LARGEST)] * len(first),
+        options={"maxfun": tries, "maxcor": 20},
+    )
     return best
 
 
