@@ -197,6 +197,29 @@ def test_the_bound_knows_no_units_and_no_axes(d: int) -> None:
     assert bound(points, enough=1e-3) >= 1e-3
 
 
+def test_points_that_share_their_forces_have_the_bound_of_one() -> None:
+    """Every point twice, with half the weight: C is singular, as that of Gauss points, and the solutions are the same."""
+    shares = []
+    for single in samples(np.random.default_rng(21)):
+        if np.isinf(single.stiffness).any():
+            continue
+        n = len(single.weights)
+        twice = single.of(np.repeat(np.arange(n), 2))
+        twice = replace(twice, weights=twice.weights / 2)
+        shares.append(bound(twice) / exact(single))
+    assert 0.05 < min(shares)
+    assert max(shares) <= 1 + 1e-9
+    assert np.median(shares) > 0.4
+
+
+def test_shorter_steps_are_a_cure_where_there_is_viscosity() -> None:
+    """And none in equilibrium, where the compliance of body and foundation have the same ratio in every step."""
+    damped = [bound(of_scene("paper_mixed", mesh__n=8, time__steps=steps)) for steps in (4, 16, 64, 256)]
+    assert all(longer < 0.9 * shorter for longer, shorter in itertools.pairwise(damped))
+    still = [bound(of_scene("quasistatic_punch", mesh__n=8, time__steps=steps)) for steps in (4, 256)]
+    assert still[0] == pytest.approx(still[1], rel=1e-2)
+
+
 def test_in_space_a_plane_problem_has_its_own_bound() -> None:
     """Points that a third direction does not couple: the bound is that of the plane, whichever axis is the third."""
     plane = random_points(np.random.default_rng(8), 3)
@@ -323,7 +346,7 @@ def test_explain_says_how_much_friction_leaves_one() -> None:
     scene = load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8})
     (said,) = [one for one in estimate.measured(scene).every_step if "one solution" in one]
     job = Run(scene)
-    most = several.of_scene(job.discretisation, job.stepper).most
+    most = bound(replace(several.condensed(job.discretisation, job.stepper), friction=np.ones(9)))
     assert said.startswith("friction: one solution in every step for mu up to ")
     stated = float(said.removeprefix("friction: one solution in every step for mu up to ").split(";")[0])
     assert 0.9 * most <= stated <= most
