@@ -163,7 +163,7 @@ def sentences(d: Discretisation, stepper: Any, stages: dict[str, int]) -> list[s
         max(found.coefficients),
         found.most,
         sharp=found.sharp,
-        timed=d.scene.inertia is not None or d.scene.viscosity is not None,
+        timed=(d.scene.inertia is not None and d.scene.inertia.density > 0) or d.scene.viscosity is not None,
         now=(int(touching.sum()), say.down(some.most)) if some is not None else (0, ""),
         other=sum(count for name, count in stages.items() if name not in ("none", "newton")),
         steps=sum(stages.values()),

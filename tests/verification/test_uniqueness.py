@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import Run, Scene, estimate, several
+from warmslip import Run, Scene, estimate, plausibility, several
 from warmslip.problem import discretise
 from warmslip.scene import build, load
 from warmslip.uniqueness import ContactPoints, Solution, bound, exact, solutions
@@ -207,9 +207,20 @@ def test_points_that_share_their_forces_have_the_bound_of_one() -> None:
         twice = single.of(np.repeat(np.arange(n), 2))
         twice = replace(twice, weights=twice.weights / 2)
         shares.append(bound(twice) / exact(single))
-    assert 0.05 < min(shares)
+    assert min(shares) > 0.05
     assert max(shares) <= 1 + 1e-9
     assert np.median(shares) > 0.4
+
+
+@pytest.mark.parametrize(("quadrature", "n"), [("gauss-2", 4), ("gauss-3", 2), ("gauss-4", 2)])
+def test_gauss_points_have_a_bound_below_the_exact_value(quadrature: str, n: int) -> None:
+    """A compliance of 1e-8 of its own at every point makes C definite, as the exact value asks."""
+    points = of_scene("paper_mixed", mesh__n=n, contact__quadrature=quadrature)
+    c = points.compliance
+    assert len(points.weights) <= MOST
+    assert np.linalg.matrix_rank(c) < len(c)
+    sharp = exact(replace(points, compliance=c + 1e-8 * np.abs(c).sum(axis=1).max() * np.eye(len(c))))
+    assert 0.4 * sharp < bound(points) < 1.001 * sharp
 
 
 def test_shorter_steps_are_a_cure_where_there_is_viscosity() -> None:
@@ -337,6 +348,10 @@ def test_a_run_says_that_a_step_may_have_several() -> None:
     assert not none
     assert told.startswith("the friction coefficient is 1.5, and every step has one solution up to 0.")
     assert "Newton's method takes the one it reaches from the forces of the step before" in told
+    assert "another start" not in told
+    told_of_starts = plausibility.several(2.0, 1.09, sharp=False, timed=True, now=(3, "1.4"), other=2, steps=9)[0]
+    assert "surely has one solution up to 1 only (1.4 if the 3 points" in told_of_starts
+    assert "(from another start in 2 of 9 steps); take shorter steps," in told_of_starts
     assert told.endswith(
         "take a softer foundation or a smaller coefficient"
     )  # no inertia: shorter steps would not help
