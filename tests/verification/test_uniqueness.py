@@ -198,14 +198,14 @@ def test_the_bound_knows_no_units_and_no_axes(d: int) -> None:
 
 
 def test_points_that_share_their_forces_have_the_bound_of_one() -> None:
-    """Every point twice, with half the weight: C is singular, as that of Gauss points, and the solutions are the same."""
+    """Every point twice, with shares of its weight: C is singular, as that of Gauss points, and the solutions are the same."""
     shares = []
     for single in samples(np.random.default_rng(21)):
         if np.isinf(single.stiffness).any():
             continue
         n = len(single.weights)
         twice = single.of(np.repeat(np.arange(n), 2))
-        twice = replace(twice, weights=twice.weights / 2)
+        twice = replace(twice, weights=twice.weights * np.tile([0.2, 0.8], n))
         shares.append(bound(twice) / exact(single))
     assert min(shares) > 0.05
     assert max(shares) <= 1 + 1e-9
@@ -220,7 +220,7 @@ def test_gauss_points_have_a_bound_below_the_exact_value(quadrature: str, n: int
     assert len(points.weights) <= MOST
     assert np.linalg.matrix_rank(c) < len(c)
     sharp = exact(replace(points, compliance=c + 1e-8 * np.abs(c).sum(axis=1).max() * np.eye(len(c))))
-    assert 0.4 * sharp < bound(points) < 1.001 * sharp
+    assert 0.5 * sharp < bound(points) < 1.001 * sharp
 
 
 def test_shorter_steps_are_a_cure_where_there_is_viscosity() -> None:
