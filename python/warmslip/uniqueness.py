@@ -179,12 +179,11 @@ class _Form:
         self._n, self._across, self._free = n, points.normals.shape[1] - 1, True
         tangential = (a[n:, n:] + a[n:, n:].T) / 2
         values, vectors = eigh(tangential)
-        base = np.eye(len(a))
-        if (
-            values[0] <= 1e-12 * values[-1]
-        ):  # forces of Gauss points that move nothing: both sides vanish there if q = 1
+        base, felt = np.eye(len(a)), values > 1e-12 * values[-1]
+        # forces of Gauss points that move nothing: both sides of (2) vanish there where all q are the same
+        if not felt.all():
             self._free = False
-            seen = vectors[:, values > 1e-12 * values[-1]]
+            seen = vectors[:, felt]
             base = np.block([[np.eye(n), np.zeros((n, seen.shape[1]))], [np.zeros((len(seen), n)), seen]])
         self._mu, self._own = mu, np.diag(tangential).reshape(n, -1).sum(axis=1)
         self._a, self._base, self._moved = a @ base, base, a[n:] @ base
