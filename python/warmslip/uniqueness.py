@@ -39,7 +39,11 @@ SMALL, DENSE = (
 )  # unknowns up to which Lanczos's method is not worth it; and up to which points have weights of their own
 TRIES, TOP, SHARP, WORST = 120, 8, 40.0, 1e3
 LARGEST = 16.0  # logarithm of a weight, where the bound grows beyond all limits
-COARSE = tuple(sorted(itertools.product((1.0, 4.0, 16.0, 64.0), (0.25, 1.0, 4.0, 16.0, 64.0, 256.0)), key=sum))  # p, t
+COARSE = (  # p, t of all points, the likely ones first
+    *itertools.product((4.0, 1.0), (4.0, 16.0, 1.0)),
+    *itertools.product((4.0, 1.0), (0.25, 64.0, 256.0)),
+    *itertools.product((16.0, 64.0), (4.0, 16.0, 1.0, 64.0, 0.25, 256.0)),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
