@@ -87,6 +87,38 @@ void bind(py::module_& m) {
             return status;
           },
           "0 open, 1 stick, 2 slip, a point")
+      .def_property_readonly(
+          "contact_compliance",
+          [](const S& s) { return s.contact_solver() ? s.contact_solver()->compliance() : Eigen::MatrixXd(); },
+          "(d points, d points), velocity per force; rigid motions apart where the body has no support")
+      .def_property_readonly(
+          "contact_motions",
+          [](const S& s) { return s.contact_solver() ? s.contact_solver()->coupling().motions : Eigen::MatrixXd(); },
+          "(d points, motions), velocities of the points in the rigid motions apart")
+      .def_property_readonly(
+          "contact_inertia",
+          [](const S& s) { return s.contact_solver() ? s.contact_solver()->coupling().inertia : Eigen::MatrixXd(); },
+          "(motions, motions), force per velocity; 0 in a step without inertia")
+      .def_property_readonly(
+          "contact_free", [](const S& s) { return s.posed().free; },
+          "(d points), velocity without contact force in the step tried last, rigid motions apart")
+      .def_property_readonly(
+          "contact_rigid",
+          [](const S& s) -> Eigen::VectorXd {  // what is posed leaves out what the known force balances
+            const auto& posed = s.posed();
+            if (posed.known_force.size() == 0 || posed.rigid.size() == 0) return posed.rigid;
+            return posed.rigid + s.contact_solver()->coupling().motions.transpose() * posed.known_force;
+          },
+          "(motions), load on the rigid motions in the step tried last")
+      .def_property_readonly(
+          "contact_penetration",
+          [](const S& s) {
+            Eigen::VectorXd out(static_cast<Eigen::Index>(s.posed().points.size()));
+            for (Eigen::Index i = 0; i < out.size(); ++i)
+              out[i] = s.posed().points[static_cast<std::size_t>(i)].penetration;
+            return out;
+          },
+          "(points), length, at the start of the step tried last with the gap of its end")
       .def_property_readonly("cost", &S::cost)
       .def_property_readonly(
           "momentum_factor", [](S& s) { return s.momentum_factor(); }, py::return_value_policy::reference_internal)

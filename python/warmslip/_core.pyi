@@ -1196,6 +1196,11 @@ class Stepper2:
         Sets the state; None for a field the problem does not have.
         """
     @property
+    def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (d points, d points), velocity per force; rigid motions apart where the body has no support
+        """
+    @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (d points)
@@ -1204,6 +1209,31 @@ class Stepper2:
     def contact_force(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (d points), of the body on the foundation
+        """
+    @property
+    def contact_free(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points), velocity without contact force in the step tried last, rigid motions apart
+        """
+    @property
+    def contact_inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (motions, motions), force per velocity; 0 in a step without inertia
+        """
+    @property
+    def contact_motions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (d points, motions), velocities of the points in the rigid motions apart
+        """
+    @property
+    def contact_penetration(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (points), length, at the start of the step tried last with the gap of its end
+        """
+    @property
+    def contact_rigid(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (motions), load on the rigid motions in the step tried last
         """
     @property
     def cost(self) -> Cost:
@@ -1330,6 +1360,11 @@ class Stepper3:
         Sets the state; None for a field the problem does not have.
         """
     @property
+    def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (d points, d points), velocity per force; rigid motions apart where the body has no support
+        """
+    @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (d points)
@@ -1338,6 +1373,31 @@ class Stepper3:
     def contact_force(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (d points), of the body on the foundation
+        """
+    @property
+    def contact_free(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (d points), velocity without contact force in the step tried last, rigid motions apart
+        """
+    @property
+    def contact_inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (motions, motions), force per velocity; 0 in a step without inertia
+        """
+    @property
+    def contact_motions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (d points, motions), velocities of the points in the rigid motions apart
+        """
+    @property
+    def contact_penetration(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (points), length, at the start of the step tried last with the gap of its end
+        """
+    @property
+    def contact_rigid(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (motions), load on the rigid motions in the step tried last
         """
     @property
     def cost(self) -> Cost:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import checkpoint
+from warmslip import checkpoint, several
 from warmslip.explain import Plan, plan
 from warmslip.foresight import before
 from warmslip.materials import cell_regions
@@ -81,6 +81,14 @@ def _bent(job: Run) -> list[str]:
     ]
 
 
+def _solutions(job: Run) -> tuple[list[str], list[str]]:
+    """How many solutions a step has, as a line, and as a warning where several are possible."""
+    if job.stepper.u is None or not len(job.discretisation.surface.weights):
+        return [], []
+    line = several.line(several.of_scene(job.discretisation, job.stepper))
+    return [line] if line else [], several.sentences(job.discretisation, job.stepper, job.stages)
+
+
 def measured(scene: Scene, *, comm: Any = None) -> Plan:
     """The plan with what it costs here: set-up and ending as they are, the trial steps times the number of steps (collective).
 
@@ -105,10 +113,12 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
         f"region '{name}': {n} of {len(mesh.cells)} cells" for name, n in zip(scene.regions, count[1:], strict=True)
     ]
     size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
+    unique, told = job.comm.bcast(_solutions(job) if job.comm.rank == 0 else None, root=0)
     return replace(
         found,
+        every_step=[*found.every_step, *unique],
         suspicious=[*found.suspicious, *_bent(job)],
-        warnings=before(job.discretisation),
+        warnings=[*before(job.discretisation), *told],
         fields=[*found.fields, size, *regions],
         solver=job.stepper.solver,
         setup_seconds=setup,

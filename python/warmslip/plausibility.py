@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -138,6 +139,33 @@ def _locking(scene: Scene) -> Iterator[str]:
                 f"{key} has a Poisson's ratio of {ratio:.5g}, at which linear elements lock: a cantilever of 4 bricks in height "
                 f"has {part:.2g} of its deflection; take {cure}, or a smaller ratio"
             )
+
+
+def several(
+    coefficient: float, most: float, *, sharp: bool, timed: bool, now: tuple[int, str], other: int, steps: int
+) -> list[str]:
+    """Of the largest friction coefficient and the largest up to which every step has one solution, beyond which some step has
+    several if it is `sharp`. `timed`: shorter steps help. `now`: how many points touch at the end and the bound of these alone;
+    `other` of the `steps` found their solution from another start.
+    """
+    known = "" if sharp else " surely"
+    rule = "Newton's method takes the one it reaches from the forces of the step before"
+    rule += f" (from another start in {other} of {steps} steps)" if other else ""
+    points, alone = now
+    touch = f" ({alone} if the {points} points that touch at the end stay the only ones)" if points else ""
+    cure = "shorter steps, a softer foundation" if timed else "a softer foundation"
+    return [
+        f"the friction coefficient is {coefficient:g}, and every step{known} has one solution up to {down(most)} only{touch}: a "
+        f"step may have several, of which {rule}; take {cure} or a smaller coefficient"
+    ]
+
+
+def down(value: float) -> str:
+    """Two digits of a positive number, rounded down."""
+    if not 0 < value < math.inf:
+        return f"{value:g}"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.floor(value / unit * (1 + 1e-12)) * unit:.2g}"
 
 
 def inside(part: str, start: float, later: float, size: float) -> list[str]:

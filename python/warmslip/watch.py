@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warmslip import growth
+from warmslip import growth, several
 from warmslip import plausibility as say
 from warmslip.coupling import coupled
 from warmslip.foresight import TIMES, before, size
@@ -228,4 +228,10 @@ class Watch:
                 facet = float(weights[of_part == i].max()) ** (1 / (d.dim - 1))
                 out += say.slid(d.scene.contacts[i].part, float(slip[here].max()), facet)
         out += say.grazing(self._job.errors.get("contact_force", 0.0))
-        return out + say.impact(seen["shortest"])
+        return out + say.impact(seen["shortest"]) + self._several()
+
+    def _several(self) -> list[str]:
+        """Whether steps may have several solutions; the same on every rank (collective)."""
+        job = self._job
+        here = several.sentences(self._d, job.stepper, job.stages) if job.comm.rank == 0 else None
+        return list(job.comm.bcast(here, root=0))

@@ -107,6 +107,8 @@ class Stepper {
   int steps() const { return cost_.steps; }
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
+  const ContactSolver<d>* contact_solver() const { return contact_.get(); }  ///< nullptr without contact points
+  const ContactProblem<d>& posed() const { return posed_; }                  ///< of the step tried last
   const Cost& cost() const { return cost_; }
   Factor* momentum_factor() { return momentum_.get(); }  ///< nullptr without motion
   Factor* heat_factor() { return heat_.get(); }          ///< nullptr without heat and when monolithic

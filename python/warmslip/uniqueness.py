@@ -1,0 +1,388 @@
+"""How much friction a step bears before it may have several solutions, and all the solutions of small steps in the plane.
+
+A contact force lambda leaves the points the velocity w = free - C lambda. Let A be C with 1/(weight c k) added to its normal
+entries, c the stiffness and k the step. Of two solutions of one step, delta being the difference of their forces, every point has
+
+    delta_n (A delta)_n <= 0,     delta_tau . (C delta)_tau <= mu |delta_n| |(C delta)_tau|                               (1)
+
+the first because the pressure grows with the penetration, the second from Coulomb's law. With any weights p_i, q_i, t_i > 0 the
+sum of the first, p_i times, and the second, q_i times, gives
+
+    delta . S delta <= 1/2 sum_i q_i mu_i (t_i |delta_n,i|^2 + |(C delta)_tau,i|^2 / t_i),     S = sym(diag(p, q) A)       (2)
+
+so the solution is unique where the largest eigenvalue of the right side over the left one is below 1. The gap has no part in it.
+
+In the plane the step is a piecewise linear map with four pieces a point, and at most four of them meet at an edge of codimension
+two. Such a map is one to one for all loads if, and only if, the determinants of its pieces have one sign (Kuhn & Loewen, Linear
+Algebra Appl. 96, 1987; Scholtes, Introduction to Piecewise Differentiable Equations, 2012). They change it first where a set of
+slipping points has det(A_nn + sum of +-mu_i columns of A_ntau) = 0, with points that stick eliminated: an eigenvalue problem.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
+from scipy.optimize import minimize
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+from warmslip.loads import Array
+
+POINTS = 8  # of which all statuses are looked at: 4^8 = 65,536
+ROUNDING, DISTINCT = 1e-12, 1e-9  # relative: of the law, and between two solutions
+SMALL, DENSE = (
+    100,
+    600,
+)  # unknowns up to which Lanczos's method is not worth it; and up to which points have weights of their own
+TRIES, TOP, SHARP, WORST = 120, 8, 40.0, 1e3
+LARGEST = 16.0  # logarithm of a weight, where the bound grows beyond all limits
+COARSE = (  # p, t of all points, the likely ones first
+    *itertools.product((4.0, 1.0), (4.0, 16.0, 1.0)),
+    *itertools.product((4.0, 1.0), (0.25, 64.0, 256.0)),
+    *itertools.product((16.0, 64.0), (4.0, 16.0, 1.0, 64.0, 0.25, 256.0)),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactPoints:
+    """The contact points of a body in one step.
+
+    Attributes
+    ----------
+    compliance : (d points, d points)
+        Velocity per force, C.
+    normals : (points, d)
+        Outward unit normals of the body.
+    weights : (points,)
+        Quadrature weights, area.
+    step : float
+        k, time.
+    stiffness : (points,)
+        c_nu, pressure per penetration: the steepest rise of the law; infinite on a rigid foundation.
+    friction : (points,)
+        mu, dimensionless. A constant bound (Tresca) is 0 here, as it leaves one solution.
+    """
+
+    compliance: Array
+    normals: Array
+    weights: Array
+    step: float
+    stiffness: Array
+    friction: Array
+
+    def of(self, points: Array) -> ContactPoints:
+        """Some of the points, by index or mask (points,); the others bear no force."""
+        d = self.normals.shape[1]
+        kept = np.arange(len(self.weights))[points]
+        rows = (kept[:, None] * d + np.arange(d)).ravel()
+        return replace(
+            self,
+            compliance=self.compliance[np.ix_(rows, rows)],
+            normals=self.normals[kept],
+            weights=self.weights[kept],
+            stiffness=self.stiffness[kept],
+            friction=self.friction[kept],
+        )
+
+    @property
+    def rubbing(self) -> ContactPoints:
+        """The points that a force moves and the foundation presses: the others have no part in the question."""
+        own = np.diag(self.compliance).reshape(self.normals.shape).sum(axis=1)
+        return self.of((own > 0) & (self.stiffness > 0))
+
+    @property
+    def frames(self) -> Array:
+        """Normal and tangents of the points as columns, (points, d, d), orthonormal."""
+        frames = np.zeros((*self.normals.shape, self.normals.shape[1]))
+        for frame, nu in zip(frames, self.normals, strict=True):
+            if len(nu) == 2:
+                frame[:] = np.column_stack([nu, (-nu[1], nu[0])])
+            else:
+                first = np.cross(nu, np.eye(3)[np.argmin(np.abs(nu))])
+                first /= np.linalg.norm(first)
+                frame[:] = np.column_stack([nu, first, np.cross(nu, first)])
+        return frames
+
+    @property
+    def operator(self) -> Array:
+        """A, (d points, d points): the normal components of all points, then the tangential ones by point."""
+        n, d = self.normals.shape
+        frames, blocks = self.frames, self.compliance.reshape(n, d, n, d)
+        turned = np.einsum("iam,iajb,jbn->imjn", frames, blocks, frames, optimize=True).reshape(n * d, n * d)
+        order = np.concatenate([np.arange(n) * d, np.delete(np.arange(n * d), np.arange(n) * d)])
+        a = turned[np.ix_(order, order)]
+        a[range(n), range(n)] += 1 / (self.weights * self.stiffness * self.step)
+        return np.asarray(a)
+
+
+def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
+    """The number by which all coefficients of friction may be multiplied so that every step surely has one solution.
+
+    Any dimension, number of points and load. 0 where nothing is proved, as on a rigid foundation with more Gauss points than
+    nodes, whose forces are shared in many ways. Sufficient alone: see `exact`.
+
+    Parameters
+    ----------
+    points
+        Compliance, law and step. The coefficients may differ; a point without friction has 0.
+    enough
+        Looks for no larger bound than this one, dimensionless.
+
+    Returns
+    -------
+    float
+        Dimensionless; infinite without friction.
+
+    Notes
+    -----
+    All weights give a bound, the best one found counts: first `COARSE` ones that are the same for all points, then, up to `DENSE`
+    unknowns, those that L-BFGS finds on the logarithm of the largest eigenvalue, smoothed over the `TOP` largest. It solves at
+    most 24 + `TRIES` eigenvalue problems of order d points: 0.1 s for 20 points, 1 s for 80 in space, 3 s for 250 in the plane.
+    """
+    points = points.rubbing
+    if not np.any(points.friction > 0):
+        return np.inf
+    n, form, best, start = len(points.weights), _Form(points), 0.0, COARSE[0]
+    for pair in COARSE:
+        found = form.value(*np.full((3, n), np.array([[pair[0]], [1.0], [pair[1]]])))
+        best, start = max((best, start), (found, pair))
+        if best >= enough:
+            return best
+    if form.size > DENSE:
+        return best
+
+    def target(x: Array) -> tuple[float, Array]:
+        nonlocal best
+        if best >= enough:
+            return 0.0, np.zeros_like(x)
+        found, value, slope = form.at(*np.split(np.exp(x), 3))
+        best = max(best, found)
+        return value, slope
+
+    tries = int(TRIES * min(1.0, (2 * DENSE / 3 / form.size) ** 2))
+    first = np.repeat(np.log([start[0], 1.0, start[1]]), n)
+    minimize(
+        target,
+        first,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(-LARGEST, LARGEST)] * len(first),
+        options={"maxfun": tries, "maxcor": 20},
+    )
+    return best
+
+
+class _Form:
+    """The two sides of (2) for all weights."""
+
+    def __init__(self, points: ContactPoints) -> None:
+        a, n, mu = points.operator, len(points.weights), points.friction
+        self._n, self._across, self._free = n, points.normals.shape[1] - 1, True
+        tangential = (a[n:, n:] + a[n:, n:].T) / 2
+        values, vectors = eigh(tangential)
+        base, felt = np.eye(len(a)), values > 1e-12 * values[-1]
+        # forces of Gauss points that move nothing: both sides of (2) vanish there where all q are the same
+        if not felt.all():
+            self._free = False
+            seen = vectors[:, felt]
+            base = np.block([[np.eye(n), np.zeros((n, seen.shape[1]))], [np.zeros((len(seen), n)), seen]])
+        self._mu, self._own = mu, np.diag(tangential).reshape(n, -1).sum(axis=1)
+        self._a, self._base, self._moved = a @ base, base, a[n:] @ base
+        self.size = base.shape[1]
+
+    def _sides(self, p: Array, q: Array, t: Array) -> tuple[Array, Array]:
+        n, mu = self._n, q * self._mu
+        weights = np.concatenate([p, np.repeat(q, self._across)])
+        left = self._base.T @ (weights[:, None] * self._a)
+        right = self._moved.T @ (np.repeat(mu / (t * self._own), self._across)[:, None] * self._moved)
+        right[range(n), range(n)] += mu * t * self._own
+        return (left + left.T) / 2, right / 2
+
+    def at(self, p: Array, q: Array, t: Array) -> tuple[float, float, Array]:
+        """The bound by weights (points,), t over a point's own compliance; what to minimise; its slope by their logarithms."""
+        n, (left, right) = self._n, self._sides(p, q, t)
+        try:
+            values, vectors = eigh(right, left, subset_by_index=[max(self.size - TOP, 0), self.size - 1])
+        except LinAlgError:  # the left side is not definite
+            return 0.0, WORST, np.zeros(3 * n)
+        kept = values > 0.5 * values[-1]
+        values, vectors = values[kept], vectors[:, kept]
+        shares = (values / values[-1]) ** SHARP
+        value = np.log(values[-1]) + np.log(shares.sum()) / SHARP
+        moved, reach = self._moved @ vectors, (t * self._own)[:, None]
+        pressing = reach * vectors[:n] ** 2
+        along = (moved**2).reshape(n, self._across, -1).sum(axis=1) / reach
+        forces = (self._base @ vectors)[n:]
+        work = (forces * moved).reshape(n, self._across, -1).sum(axis=1)
+        mu = (q * self._mu / 2)[:, None]
+        by_p = -p[:, None] * vectors[:n] * (self._a[:n] @ vectors)
+        by_q = mu * (pressing + along) / values - q[:, None] * work
+        by_t = mu * (pressing - along) / values
+        slope = np.concatenate([by_p, self._free * by_q, by_t]) @ (shares / shares.sum())
+        return float(1 / values[-1]), float(value), slope
+
+    def value(self, p: Array, q: Array, t: Array) -> float:
+        """The bound alone."""
+        left, right = self._sides(p, q, t)
+        try:
+            if self.size <= SMALL:
+                return float(1 / eigh(right, left, eigvals_only=True)[-1])
+            return 1 / _largest(right, cholesky(left, lower=True))
+        except (LinAlgError, ArpackError):  # the left side is not definite
+            return 0.0
+
+
+def _largest(right: Array, factor: Array) -> float:
+    """The largest eigenvalue of L^-1 right L^-T by Lanczos's method, to 1e-6."""
+
+    def apply(x: Array) -> Array:
+        half = solve_triangular(factor, x, lower=True, trans="T")
+        return np.asarray(solve_triangular(factor, right @ half, lower=True))
+
+    operator = LinearOperator(right.shape, matvec=apply, dtype=float)
+    start = np.ones(len(right))
+    return float(eigsh(operator, k=1, tol=1e-6, v0=start, return_eigenvectors=False)[0])
+
+
+def exact(points: ContactPoints) -> float:
+    """The number by which all coefficients may be multiplied until some load has several solutions, or none, in the plane.
+
+    Below it every load has one solution. Looks at all statuses: at most `POINTS` points, seconds for 8.
+
+    Parameters
+    ----------
+    points
+        Compliance, law and step; the law piecewise linear with Coulomb's friction, d = 2, C positive definite.
+
+    Returns
+    -------
+    float
+        Dimensionless; infinite where no friction makes a difference.
+
+    Raises
+    ------
+    ValueError
+        In space, or for more points.
+    """
+    points = points.rubbing
+    _refuse(points)
+    a, n, mu = points.operator, len(points.weights), points.friction
+    most = 0.0
+    for size in range(1, n + 1):
+        rest = list(itertools.product((1.0, -1.0), repeat=size - 1))
+        signs = np.hstack([np.ones((len(rest), 1)), np.array(rest).reshape(len(rest), size - 1)])
+        for slips in itertools.combinations(range(n), size):
+            others = [i for i in range(n) if i not in slips and mu[i] > 0]
+            for count in range(len(others) + 1):
+                for sticks in itertools.combinations(others, count):
+                    most = max(most, _first_change(a, n, mu, list(slips), list(sticks), signs))
+    return 1 / most if most > 0 else np.inf
+
+
+def _refuse(points: ContactPoints) -> None:
+    if points.normals.shape[1] != 2 or len(points.weights) > POINTS:
+        raise ValueError(f"all statuses are looked at for at most {POINTS} points in the plane; give fewer")
+
+
+def _first_change(a: Array, n: int, mu: Array, slips: list[int], sticks: list[int], signs: Array) -> float:
+    """The reciprocal of the least factor of mu at which a determinant of these slipping and sticking points vanishes."""
+    stuck, along = sticks + [n + i for i in sticks], [n + i for i in slips]
+    free = slips + along
+    rows = a[np.ix_(slips, free)]
+    if stuck:
+        rows = rows - a[np.ix_(slips, stuck)] @ np.linalg.solve(a[np.ix_(stuck, stuck)], a[np.ix_(stuck, free)])
+    size = len(slips)
+    pull = np.linalg.solve(rows[:, :size], rows[:, size:]) * mu[slips]
+    values = np.linalg.eigvals(pull * signs[:, None, :])
+    real = np.abs(values.imag) <= 1e-9 * np.abs(values).max()
+    return float(np.abs(values.real[real]).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """One solution of a step: `force` of the body on the foundation and `velocity`, (points, d); `status` as in the core."""
+
+    force: Array
+    velocity: Array
+    status: list[int]  # 0 open, 1 stick, 2 slip
+
+
+def solutions(points: ContactPoints, free: Array, penetration: Array) -> list[Solution]:
+    """All solutions of one step in the plane: every status of every point is solved and held against the law.
+
+    At most `POINTS` points with a linear pressure and Coulomb's friction. A load at which solutions branch may have a whole line
+    of them, of which the ends are found. Costs 4^points small systems, seconds for 8 points.
+
+    Parameters
+    ----------
+    points
+        Compliance, law and step, d = 2.
+    free : (points, d)
+        Velocity without contact forces.
+    penetration : (points,)
+        u_nu - g at the start of the step with the gap of its end, length.
+
+    Returns
+    -------
+    list
+        At least one below `exact` times the coefficients, for any load.
+
+    Raises
+    ------
+    ValueError
+        In space, or for more points.
+    """
+    _refuse(points)
+    n, frames, a = len(points.weights), points.frames, points.operator
+    drive = np.einsum("iam,ia->mi", frames, np.asarray(free, dtype=float)).ravel()
+    drive[:n] += np.asarray(penetration, dtype=float) / points.step
+    forces: list[Array] = []
+    statuses = np.stack(np.unravel_index(np.arange(4**n), (4,) * n), axis=1)
+    for some in np.array_split(statuses, max(1, len(statuses) // 4096)):
+        for force in _lawful(a, drive, points.friction, some):
+            size = np.abs(force).max()
+            if all(np.abs(force - other).max() > DISTINCT * max(size, np.abs(other).max()) for other in forces):
+                forces.append(force)
+    return [_told(points, force, np.asarray(free, dtype=float)) for force in forces]
+
+
+def _lawful(a: Array, drive: Array, mu: Array, statuses: Any) -> Array:
+    """Forces (solutions, 2 points) under which the given statuses (many, points) satisfy the law; see `operator`.
+
+    Statuses are open, stick, and slip along and against the tangent. A closed point has (A lambda)_n = drive_n, one that sticks
+    (A lambda)_tau = drive_tau; the slip velocity is drive_tau - (A lambda)_tau.
+    """
+    count, n = statuses.shape
+    sign = np.array([0.0, 0.0, 1.0, -1.0])[statuses]
+    matrices = np.tile(np.eye(2 * n), (count, 1, 1))
+    right = np.zeros((count, 2 * n))
+    for rows, here in ((slice(0, n), statuses > 0), (slice(n, 2 * n), statuses == 1)):
+        matrices[:, rows] = np.where(here[:, :, None], a[rows], matrices[:, rows])
+        right[:, rows] = np.where(here, drive[rows], 0.0)
+    at = np.arange(n)
+    matrices[:, n + at, at] -= np.where(statuses >= 2, sign * mu, 0.0)
+    regular = np.linalg.slogdet(matrices)[0] != 0
+    sign, statuses = sign[regular], statuses[regular]
+    force = np.linalg.solve(matrices[regular], right[regular][:, :, None])[:, :, 0]
+    velocity = drive - force @ a.T
+    forces = ROUNDING * np.abs(force).max(axis=1, initial=0.0)[:, None]
+    velocities = ROUNDING * (np.abs(drive) + np.abs(force) @ np.abs(a).T).max(axis=1)[:, None]
+    closed, sticks = statuses > 0, statuses == 1
+    pressure, pull, apart, slip = force[:, :n], force[:, n:], velocity[:, :n], velocity[:, n:]
+    holds = np.where(closed, pressure >= -forces, apart <= velocities)
+    holds &= np.where(sticks, np.abs(pull) <= mu * pressure + forces, sign * slip >= -velocities)
+    return np.asarray(force[holds.all(axis=1)])
+
+
+def _told(points: ContactPoints, force: Array, free: Array) -> Solution:
+    """A solution in components x, y from forces in the frames, with the statuses that the forces tell."""
+    n = len(points.weights)
+    tells = ROUNDING * 1e3 * np.abs(force).max(initial=0.0)
+    pressure, pull = force[:n], np.abs(force[n:])
+    slips = pull >= points.friction * pressure - tells
+    status = np.where(pressure <= tells, 0, np.where(slips, 2, 1))
+    across = np.einsum("iam,mi->ia", points.frames, force.reshape(2, n))
+    return Solution(across, free - (points.compliance @ across.ravel()).reshape(n, 2), [int(one) for one in status])
