@@ -264,4 +264,5 @@ def von_mises(stress: Array, zz: Array | None = None) -> Array:
     if zz is not None:
         full[:, 2, 2] = zz
     deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))
+    with np.errstate(over="ignore"):  # a run that overflowed is drawn as far as it came
+        return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))
