@@ -147,6 +147,7 @@ class Stepper {
   bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
   bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
   bool measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const;
+  bool iterative() const;
   bool in_range(const Eigen::VectorXd& values) const;
   int substitutions() const;
 

@@ -302,6 +302,12 @@ Outcome Stepper<d>::judge(const Ledger& l) const {
   return weighed().largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
 }
 
+// Whether PETSc's options put an iterative solver in the place of a factorization.
+template <int d>
+bool Stepper<d>::iterative() const {
+  return (momentum_ && layout_.sum(momentum_->bytes()) == 0) || (heat_ && layout_.sum(heat_->bytes()) == 0);
+}
+
 // What a step that is not right is told of.
 template <int d>
 std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
@@ -324,7 +330,10 @@ std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
       for (const auto& [name, residual] : {std::pair{"energy", l.energy_residual}, std::pair{"heat", l.heat_residual},
                                            std::pair{"force", l.force_residual}, std::pair{"law", l.law_residual}})
         if (!(residual <= bound)) list(name);
-      return names + " stays open: the linear solver is loose, and refinement does not mend it";
+      return names + (iterative()
+                          ? " stays open: the linear solver is loose, and refinement does not mend it"
+                          : " stays open, and refinement does not mend it: terms of the step cancel beyond double "
+                            "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other");
     }
     default:
       return "";
