@@ -177,7 +177,7 @@ class Watch:
         values = theta.array_r
         least, most = theta.min()[1], theta.max()[1]
         spread = (high - low) if np.isfinite(high - low) else max(abs(least), abs(most))
-        band = say.BEYOND * spread
+        band = max(say.BEYOND * spread, 1e-10 * max(abs(least), abs(most)))  # of equal data the rounding is no spread
         for name, out, value, bound in (
             ("low", least < low - band, least, low),
             ("high", most > high + band, most, high),

@@ -512,3 +512,22 @@ def test_two_ranks_say_it_once_and_the_same(command: Command, tmp_path: Path) ->
         assert all(f"warning: {one}" in done.stderr for one in found)
         said.append(found)
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("capacity", ["lumped", "consistent"])
+@pytest.mark.parametrize("level", [1.0, 293.15])
+def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str, level: float) -> None:
+    job = warmslip.Run(
+        build(
+            {
+                "mesh": {"shape": "square" if d == 2 else "cube", "n": [2, 3, 2][:d]},
+                "time": {"steps": 6, "end": 10.0},
+                "heat": {"conductivity": 0.7, "capacity": 1.0, "capacity_matrix": capacity},
+                "initial": {"temperature": level},
+            }
+        )
+    )
+    for _ in job.steps():
+        pass
+    assert not [said for said in job.summary()["warnings"] if "the data allow" in said]
