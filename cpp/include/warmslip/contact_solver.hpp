@@ -27,7 +27,7 @@ struct ContactProblem {
   Eigen::VectorXd free;     ///< (d points), velocity without contact force
   Eigen::VectorXd rigid{};  ///< (motions), load on the rigid motions that are solved for apart, see RigidCoupling
   /// (d points), a force and the velocities under it, `rigid` being what it leaves of that load: forces near it then
-  /// have velocities without rounding of the free ones. Zero and `free` where nothing is known.
+  /// have velocities without rounding of the free ones. Both empty where nothing is known.
   Eigen::VectorXd known_force{}, known_velocity{};
 
   const ContactLaw& law(std::size_t point) const { return laws[points[point].law]; }

@@ -77,7 +77,8 @@ class Bookkeeper {
   void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
                    Vec external = nullptr) const;
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
-  /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel).
+  /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
+  /// any, gets the same but for the inner terms, whose rounding moves no rigid body.
   void add_rounding(Vec defect, Vec external) const;
 
  private:
@@ -94,13 +95,13 @@ class Bookkeeper {
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, contact_force_;  // B w, E lambda
-  VecHandle conducted_, exchanged_, contact_heat_,
-      contact_heat_size_;  // D theta, J theta, heat that leaves at the contact points
+  VecHandle viscous_w_, contact_force_;         // B w, E lambda
+  VecHandle conducted_, exchanged_;             // D theta, J theta
+  VecHandle contact_heat_, contact_heat_size_;  // heat that leaves at the contact points, and its magnitudes
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;  // hat functions at the contact points, found anew from positions
-  Eigen::VectorXd force_magnitudes_, heat_magnitudes_, force_external_,
-      heat_external_;          // of the rows, zero where they are fixed
+  Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
+  Eigen::VectorXd force_external_, heat_external_;      // but for the inner forces and the conduction
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;

@@ -1,111 +1,14 @@
-#include "warmslip/contact_solver.hpp"
-
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
+
+#include "contact_linearisation.hpp"
 
 namespace warmslip {
 namespace {
 
 constexpr int few_steps = 15;  // before other scales are tried
 
-template <int d>
-const Eigen::VectorXd& known_velocity(const ContactProblem<d>& problem) {
-  return problem.known_force.size() > 0 ? problem.known_velocity : problem.free;
-}
-
-// The forces of what is added to the known ones, and back.
-template <int d>
-Eigen::VectorXd total(const ContactProblem<d>& problem, const Eigen::VectorXd& added) {
-  return problem.known_force.size() > 0 ? Eigen::VectorXd(problem.known_force + added) : added;
-}
-template <int d>
-Eigen::VectorXd beyond_known(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
-  return problem.known_force.size() > 0 ? Eigen::VectorXd(force - problem.known_force) : force;
-}
-
-// Whether statuses alone make the tangent.
-template <int d>
-bool by_status(const ContactProblem<d>& problem) {
-  return d == 2 && std::all_of(problem.laws.begin(), problem.laws.end(),
-                               [](const ContactLaw& law) { return law.piecewise_linear(); });
-}
-
 }  // namespace
-
-namespace {
-
-// How far the penetration r is from those that bear `pressure`; infinite where none does, or none is known to.
-double distance(const NormalCompliance& law, double pressure, double r) {
-  if (pressure < 0) return unlimited;
-  if (pressure == 0) return std::max(r, 0.0);
-  if (law.rigid()) return std::abs(r);
-  if (law.custom) {
-    const double slope = law.tangent(r);
-    return slope > 0 ? std::abs(pressure - law.pressure(r)) / slope : unlimited;
-  }
-  if (law.stiffness == 0) return unlimited;
-  if (law.at_limit(pressure)) return pressure > law.most ? unlimited : std::max(law.deepest_rise() - r, 0.0);
-  return std::abs(r - law.penetration(pressure, r));
-}
-
-}  // namespace
-
-template <int d>
-double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
-  double largest = 0, reach = 0, fastest = 0, widest = 0;
-  for (std::size_t i = 0; i < problem.points.size(); ++i) {
-    const auto& point = problem.points[i];
-    if (point.prescribed) continue;
-    const auto at = static_cast<Eigen::Index>(i) * d;
-    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
-                   free = problem.free.template segment<d>(at);
-    const double speed = (w - w.dot(point.normal) * point.normal).norm(), lambda = f.dot(point.normal);
-    const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
-    // the velocity is what the contact force leaves of the free one
-    reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
-    fastest = std::max({fastest, free.norm(), w.norm()});
-    largest = std::max(largest, f.norm());
-    widest = std::max(widest,
-                      point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
-  }
-  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(fastest))
-    return std::numeric_limits<double>::infinity();
-  largest = std::max(largest, widest);
-  double worst = 0;
-  for (std::size_t i = 0; i < problem.points.size(); ++i) {
-    const auto& point = problem.points[i];
-    const ContactLaw& law = problem.law(i);
-    const auto at = static_cast<Eigen::Index>(i) * d;
-    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
-    const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
-    const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
-    const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
-    if (point.prescribed) {  // its force is computed from its motion alone
-      const double size = std::max(f.norm(), bound),
-                   error = std::abs(lambda - point.weight * law.compliance.pressure(r));
-      if (!std::isfinite(error)) return unlimited;
-      if (size > 0) worst = std::max({worst, error / size, (f_tau.norm() - bound) / size});
-      continue;
-    }
-    const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
-                 away = distance(law.compliance, lambda / point.weight, r);
-    const double wrong = largest > 0 ? off / largest : unlimited;
-    const double normal = off == 0 || away == 0 ? 0 : std::min(wrong, away / reach);
-    const double friction =
-        friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
-    if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
-    worst = std::max({worst, normal, friction});
-  }
-  return worst;
-}
-
-template <int d>
-struct ContactSolver<d>::Linearisation {
-  Eigen::VectorXd velocity, value;  // value: of all points, then of the rigid motions
-  std::vector<PointResidual<d>> points;
-  std::vector<int> key;  // what the tangent depends on
-};
 
 template <int d>
 ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions options, RigidCoupling rigid)
@@ -359,125 +262,6 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
   return true;
 }
 
-// Thresholds frozen, the step is convex: minimise 1/2 l.C l - l.free plus the law's conjugate by accelerated proximal
-// gradients, move the thresholds, repeat; Newton finishes from there. Slow, and indifferent to stiffness and statuses.
-template <int d>
-bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
-  if (rigid_.count() > 0) return false;
-  for (const ContactLaw& law : problem.laws)  // smooth: no threshold to freeze
-    if (law.friction.regularisation > 0) return false;
-  const double rate = 1 / spectral_, k = problem.step;
-  // lambda = weight p_nu(r) with r = penetration + k (z - lambda) / rate: falls on the right, rises on the left
-  const auto normal_force = [&](const ContactPoint<d>& point, const NormalCompliance& law, double z) {
-    if (law.linear()) {
-      const double spring = point.weight * law.stiffness * k;  // force per velocity
-      return spring > 0 ? std::max(0.0, (z + rate * point.penetration / k) / (1 + rate / spring)) : 0.0;
-    }
-    // no more than what holds the point at r = 0; a law of the user's may know no pressure beyond
-    double low = 0, high = std::min(point.weight * law.pressure(point.penetration + k * z / rate),
-                                    std::max(0.0, z + rate * point.penetration / k));
-    for (int i = 0; i < 60 && low < high; ++i) {
-      const double middle = 0.5 * (low + high);
-      (point.weight * law.pressure(point.penetration + k * (z - middle) / rate) > middle ? low : high) = middle;
-    }
-    return 0.5 * (low + high);
-  };
-  const auto prox = [&](const Eigen::VectorXd& z, const Eigen::VectorXd& bounds) {
-    Eigen::VectorXd out(z.size());
-    for (std::size_t i = 0; i < problem.points.size(); ++i) {
-      const auto& point = problem.points[i];
-      const auto row = static_cast<Eigen::Index>(i) * d;
-      const double zn = z.template segment<d>(row).dot(point.normal);
-      const double normal = normal_force(point, problem.law(i).compliance, zn);
-      Point<d> tangential = z.template segment<d>(row) - zn * point.normal;
-      const double bound = bounds[static_cast<Eigen::Index>(i)];
-      if (tangential.norm() > bound) tangential *= bound / tangential.norm();
-      out.template segment<d>(row) = normal * point.normal + tangential;
-    }
-    return out;
-  };
-  Eigen::VectorXd force = total(problem, solution.added), momentum = force,
-                  bounds(static_cast<Eigen::Index>(problem.points.size()));
-  Eigen::VectorXd velocity = problem.free;
-  const auto under = [&](const Eigen::VectorXd& forces) -> Eigen::VectorXd {
-    return known_velocity(problem) - compliance_ * beyond_known(problem, forces);
-  };
-  const auto threshold = [&](std::size_t i) {
-    const auto& point = problem.points[i];
-    const auto row = static_cast<Eigen::Index>(i) * d;
-    const Point<d> w = velocity.template segment<d>(row);
-    const double pressure = std::max(0.0, force.template segment<d>(row).dot(point.normal)) / point.weight;
-    return point.weight *
-           problem.law(i).friction.bound(pressure, (w - w.dot(point.normal) * point.normal).norm()).value;
-  };
-  double inertia = 1;
-  for (int step = 0; step < options_.fixed_point_steps; ++step) {
-    if (step % 20 == 0) {
-      velocity = under(force);
-      for (std::size_t i = 0; i < problem.points.size(); ++i) bounds[static_cast<Eigen::Index>(i)] = threshold(i);
-      momentum = force;
-      inertia = 1;
-    }
-    const Eigen::VectorXd next = prox(momentum + rate * under(momentum), bounds);
-    if (!next.allFinite()) return false;
-    const double stronger = (1 + std::sqrt(1 + 4 * inertia * inertia)) / 2;
-    momentum = next + (inertia - 1) / stronger * (next - force);
-    force = next;
-    inertia = stronger;
-    if (step % 200 == 199) {
-      solution.added = beyond_known(problem, force);
-      if (newton(problem, true, solution)) return true;
-      solution.added = beyond_known(problem, force);
-      if (newton(problem, false, solution)) return true;
-    }
-  }
-  return false;
-}
-
-template <int d>
-bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
-  const auto count = problem.points.size();
-  if (!by_status(problem) || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
-  for (const ContactLaw& law : problem.laws)  // a bound that is there without pressure has more statuses
-    if (law.friction.cohesion > 0 || law.compliance.rigid()) return false;
-  if (rigid_.count() > 0) return false;
-  const double k = problem.step;
-  for (std::size_t code = 0, codes = std::size_t{1} << (2 * count); code < codes; ++code) {
-    Eigen::MatrixXd by_force = Eigen::MatrixXd::Zero(compliance_.rows(), compliance_.cols()), by_velocity = by_force;
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(compliance_.rows());
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto row = static_cast<Eigen::Index>(i) * 2;
-      const auto& point = problem.points[i];
-      const Eigen::Vector2d nu = point.normal.template head<2>(), tau(-nu[1], nu[0]);
-      const auto choice = code >> (2 * i) & 3;  // 0 open, 1 stick, 2 and 3 slip
-      const ContactLaw& law = problem.law(i);
-      const double spring = choice == 0 ? 0 : point.weight * law.compliance.stiffness;
-      const double drag = choice < 2 ? 0 : (choice == 2 ? 1 : -1) * law.friction.coefficient * spring;
-      by_force.block<1, 2>(row, row) = nu.transpose();
-      by_velocity.block<1, 2>(row, row) = -spring * k * nu.transpose();
-      right[row] = spring * point.penetration;
-      if (choice == 1) {
-        by_velocity.block<1, 2>(row + 1, row) = tau.transpose();
-      } else {
-        by_force.block<1, 2>(row + 1, row) = tau.transpose();
-        by_velocity.block<1, 2>(row + 1, row) = -drag * k * nu.transpose();
-        right[row + 1] = drag * point.penetration;
-      }
-    }
-    const Eigen::FullPivLU<Eigen::MatrixXd> lu(by_force - by_velocity * compliance_);
-    solution.force = lu.solve(right - by_velocity * problem.free);
-    if (!solution.force.allFinite()) continue;
-    solution.added = beyond_known(problem, solution.force);
-    const Linearisation at = linearise(problem, solution.added, solution.rigid);
-    solution.velocity = at.velocity;
-    if (!accept(problem, solution)) continue;
-    solution.status.clear();
-    for (const auto& point : at.points) solution.status.push_back(point.status);
-    return true;
-  }
-  return false;
-}
-
 // Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
 template <int d>
 struct ContactSolver<d>::Trial {
@@ -570,8 +354,6 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   return solution;
 }
 
-template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
-template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
 template class ContactSolver<2>;
 template class ContactSolver<3>;
 

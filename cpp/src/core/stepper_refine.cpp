@@ -1,0 +1,203 @@
+// Iterative refinement of a step, contact included, and how many digits of it can be trusted.
+#include <algorithm>
+#include <cmath>
+
+#include "warmslip/stepper.hpp"
+
+namespace warmslip {
+namespace {
+
+double largest_entry(Vec v) {
+  PetscReal value = 0;
+  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+  return value;
+}
+
+double largest_entry(const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
+
+}  // namespace
+
+double Errors::largest() const {
+  double worst = 0;
+  for (const double error : {u, theta, stress, contact_force})
+    if (std::isgreater(error, worst)) worst = error;  // quiet about nan, also where it traps
+  return worst;
+}
+
+// Notes a change as a field's error relative to its largest value so far.
+template <int d>
+void Stepper<d>::note(double& error, double& scale, double change, double size) {
+  scale = std::max(scale, size);
+  error = scale > 0 ? change / scale : 0;
+}
+
+// One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
+// solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
+template <int d>
+bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply) {
+  const bool monolithic = this->monolithic();
+  const StepInputs inputs = this->inputs(loads, contact);
+  books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
+  if (!apply) books_.add_rounding(momentum_right_, momentum_external_);
+  if (monolithic) {
+    books_.heat_defect(now_, next_, inputs, heat_right_);
+    if (!apply) books_.add_rounding(heat_right_, nullptr);
+    join(momentum_right_, heat_right_, coupled_right_);
+  }
+  const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
+  ContactSolution<d> change, again;
+  if (contact_) {
+    const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
+    posed_.known_force = contact.force;
+    posed_.known_velocity = apply ? velocity + correction : velocity;
+    posed_.rigid = rigid_load_;
+    posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
+    again = contact;
+    if (!(apply ? solve_contact(contact.force, again) : contact_->respond(posed_, correction, again))) return false;
+    if (apply) free_ = posed_.free;
+    change = again;
+    change.force = again.added;
+    if (apply) again.iterations += contact.iterations;
+    again.stage = std::max(again.stage, contact.stage);
+  }
+  const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
+  if (monolithic) {
+    split(coupled_, correction_w_, correction_theta_);
+    note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
+         std::max(largest_entry(next_.theta), ledger.temperature_scale));
+    if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+  }
+  if (contact_) {
+    const Vec moved = momentum_right_;
+    WARMSLIP_PETSC(VecWAXPY(moved, 1, correction_w_, next_.w));
+    settle(again, moved, correction_strained_);
+    WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
+  }
+  note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
+       std::max({largest_entry(next_.u), largest_entry(now_.u), ledger.displacement_scale}));
+  if (next_.elastic_u || operators_.viscosity) {
+    const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
+    WARMSLIP_PETSC(VecCopy(change_w, change_u));
+    WARMSLIP_PETSC(VecScale(change_u, options_.k));
+    const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
+    double by_forces = Errors::unknown;
+    note(errors_.stress, scales_.stress, stress_size(layout_, problem_, change_u, change_w).largest,
+         std::max(there.largest, 1e-8 * there.possible));
+    if (next_.elastic_u) {  // inner forces far smaller than the others matter to nobody
+      multiply(operators_.elasticity, change_w, momentum_right_);
+      note(by_forces, scales_.force, options_.k * largest_entry(momentum_right_), ledger.force_scale);
+      errors_.stress = std::min(errors_.stress, by_forces);
+    }
+  }
+  if (contact_) {
+    note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
+         std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
+    scales_.force = std::max(scales_.force, ledger.force_scale);
+    if (scales_.force > 0) grazing_ = std::min(1.0, 1e2 * scales_.contact_force / scales_.force);
+  }
+  if (apply) {
+    if (contact_) contact = std::move(again);
+    WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
+    if (!rigid_.empty()) {
+      WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
+      next_.rigid += motions;
+    }
+  }
+  return true;
+}
+
+// Takes the force of points that are held by their law from the equations of their nodes, where compliances leave it
+// only as many digits as the largest force has.
+template <int d>
+void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
+  books_.momentum_defect(now_, next_, inputs, momentum_right_);
+  const Eigen::VectorXd left = surface_.nodal_values(momentum_right_), velocities = surface_.nodal_values(next_.w);
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Eigen::Index node = surface_.own_node(i);
+    const Status status = contact.status[static_cast<std::size_t>(i)];
+    if (node < 0 || status == Status::open) continue;
+    const Point<d> nu = surface_.normals().row(i).transpose(), rest = left.segment<d>(node * d),
+                   velocity = velocities.segment<d>(node * d), slip = velocity - velocity.dot(nu) * nu;
+    const bool rests = status == Status::stick && slip.norm() <= 1e-15 * velocity.norm();
+    contact.force.template segment<d>(i * d) += rests ? rest : Point<d>(rest.dot(nu) * nu);
+  }
+}
+
+template <int d>
+void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
+  books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  if (!apply) books_.add_rounding(heat_right_, heat_external_);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
+  solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
+  note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
+       std::max(largest_entry(next_.theta), ledger.temperature_scale));
+  if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+}
+
+// Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
+template <int d>
+Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
+  const double enough = options_.refinement, rows = enough / options_.row_refinement;
+  const auto warmth = [&] { return std::max(ledger.heat_defect, rows * ledger.heat_residual); };
+  const auto motion = [&] {
+    return std::max(
+        {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
+  };
+  // a pass whose change is small says that the one before has done its work
+  const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
+  bool refined = false, warmed = false;
+  double warmer = Errors::unknown;
+  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
+    const double rest = motion(), error = errors_.largest();
+    if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
+      react(inputs(loads, contact), contact);
+      ledger = balance(complete(loads, contact));
+    }
+    if (!correct_motion(loads, ledger, contact, true)) break;
+    ledger = balance(complete(loads, contact));
+    ++cost_.refinements;
+    refined = true;
+    if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
+  }
+  for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
+    const double rest = warmth();
+    correct_heat(inputs(loads, contact), ledger, true);
+    products(next_);
+    ledger = balance(inputs(loads, contact));
+    ++cost_.refinements;
+    if (!(warmth() < 0.5 * rest) && warmed && !(errors_.theta < 0.5 * warmer)) break;
+    warmer = errors_.theta;
+    warmed = true;
+  }
+  const bool wanted = measured_now(loads, contact);
+  if (!wanted && !refined && !warmed) return ledger;
+  const int before = substitutions();
+  if (momentum_ && (refined || wanted)) correct_motion(loads, ledger, contact, false);
+  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
+  cost_.substitutions -= substitutions() - before;
+  ++cost_.estimates;
+  return ledger;
+}
+
+// Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run
+// that goes on measures the same ones.
+template <int d>
+bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
+  if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
+  for (double step = 1, n = std::round(time_ / options_.k) + 1; step <= n; step *= options_.measured_steps)
+    if (step == n) return true;
+  return false;
+}
+
+// The errors that may end a run: that of a contact that hardly touches is seen beside the other forces.
+template <int d>
+Errors Stepper<d>::weighed() const {
+  Errors out = errors_;
+  out.contact_force *= grazing_;
+  return out;
+}
+
+template class Stepper<2>;
+template class Stepper<3>;
+
+}  // namespace warmslip
