@@ -130,6 +130,19 @@ def test_states_and_laws_are_the_same_on_any_number_of_ranks(tmp_path: Path) -> 
     assert told[1] == pytest.approx(told[0], rel=1e-10, abs=1e-13)
 
 
+def launched(folder: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    """What `mpirun` makes of these words."""
+    return subprocess.run(
+        ["mpirun", *map(str, words)],
+        env=child_environment(),
+        cwd=folder,
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+
+
 COLLECTED_APART = """
 import gc
 from mpi4py import MPI
@@ -149,16 +162,9 @@ print(warmslip.load("block_3d").title)
 
 
 @pytest.mark.mpi
-def test_ranks_may_collect_a_dropped_run_at_different_times() -> None:
+def test_ranks_may_collect_a_dropped_run_at_different_times(tmp_path: Path) -> None:
     """A run in a circle of references is collected when Python likes; its solver is destroyed by all ranks together."""
-    result = subprocess.run(
-        ["mpirun", "-n", "2", sys.executable, "-c", COLLECTED_APART],
-        env=child_environment(),
-        text=True,
-        capture_output=True,
-        timeout=120,
-        check=False,
-    )
+    result = launched(tmp_path, "-n", "2", sys.executable, "-c", COLLECTED_APART)
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("\n") == 2
 
@@ -207,15 +213,7 @@ def test_a_rank_that_fails_alone_ends_all(tmp_path: Path, how: str, rank: int) -
     """A script as users write it, without `-m mpi4py`; where all ranks raise, each ends by itself and none is aborted."""
     (tmp_path / "script.py").write_text(FAILING_ALONE)
     began = time.monotonic()
-    result = subprocess.run(
-        ["mpirun", "-n", "2", sys.executable, "script.py", how, str(rank)],
-        env=child_environment(),
-        cwd=tmp_path,
-        text=True,
-        capture_output=True,
-        check=False,
-        timeout=60,
-    )
+    result = launched(tmp_path, "-n", "2", sys.executable, "script.py", how, rank)
     assert result.returncode != 0 and time.monotonic() - began < 30
     said = {"raises": "ValueError: no such thing", "out of memory": "MemoryError: no room", "is killed": "signal 9"}
     if how == "everywhere":
@@ -232,14 +230,6 @@ def test_ranks_that_read_different_scenes_end_together(tmp_path: Path) -> None:
     program = Path(sys.executable).parent / "warmslip"
     mine = [program, "run", "paper_mixed", "--set", "mesh.n=8", "--set", "time.steps=4000"]
     theirs = [program, "run", "nowhere.toml"]
-    result = subprocess.run(
-        ["mpirun", "-n", "1", *map(str, mine), ":", "-n", "1", *map(str, theirs)],
-        env=child_environment(),
-        cwd=tmp_path,
-        text=True,
-        capture_output=True,
-        check=False,
-        timeout=60,
-    )
+    result = launched(tmp_path, "-n", "1", *mine, ":", "-n", "1", *theirs)
     assert result.returncode == 2
     assert result.stderr.count("the ranks read different scenes; one of them refused: cannot read scene") == 1

@@ -49,9 +49,8 @@ KELVIN = {
 }
 
 STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
-COUPLED: dict[
-    str, Any
-] = {  # a column, as in test_long_runs, in steps of 0.54 where 0.533 is the longest that staggered ones stand
+# a column, as in test_long_runs, in steps of 0.54 where 0.533 is the longest that staggered ones stand
+COUPLED: dict[str, Any] = {
     "mesh": {"shape": "square", "n": 4},
     "time": {"end": 162.0, "steps": 300},
     "elasticity": {"lame": [0.0, 0.75]},
@@ -430,37 +429,6 @@ def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert again.right and again.summary["warnings"] == whole
 
 
-@pytest.mark.parametrize(
-    ("square", "climbs"),
-    [
-        (lambda n: 1.05**n, True),
-        (lambda n: 1e-30 * 1.5**n, True),
-        (lambda n: 1 + 1e-3 * 1.2**n, True),
-        (lambda n: 1.05**n * (2 + np.sin(n)), True),
-        (lambda n: n**5, False),
-        (lambda n: 1 + 1e-3 * n**4, False),
-        (lambda n: 1e10 if n > 150 else 1e-10, False),
-        (lambda n: 1e10 if n % 40 == 0 else 1.0, False),
-        (lambda n: 1e-300 if n < 150 else np.exp(-1e3 / (n - 149)), False),
-        (lambda n: 0.0, False),
-    ],
-)
-def test_a_climb_is_straight(square: Any, climbs: bool) -> None:
-    course, found = growth.start(), []
-    for n in range(1, 301):
-        if growth.add(course, [growth.log(square(n))]) and (climb := growth.climb(course)):
-            found.append(climb)
-    assert bool(found) == climbs and len(course["rows"]) <= growth.ROOM and growth.fits(course)
-
-
-def test_a_full_course_keeps_the_largest_of_two() -> None:
-    course = growth.start()
-    for n in range(growth.ROOM + 1):
-        growth.add(course, [float(n), -float(n)])
-    assert course["stride"] == 2 and course["count"] == 1 and len(course["rows"]) == growth.ROOM / 2 + 1
-    assert course["rows"][:2] == [[1.0, 0.0], [3.0, -2.0]] and course["rows"][-1] == [growth.ROOM, -growth.ROOM]
-
-
 @pytest.mark.parametrize(("mechanical", "told"), [(0.0, True), (1.0, True), (1e3, False)])
 def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bool) -> None:
     """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
@@ -472,33 +440,6 @@ def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bo
     assert bool(job.watch.fed()) == told
     share = job.watch.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
     assert share == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_climb_of_the_data_is_no_growth() -> None:
-    for pace, grows in ((0.0, True), (0.001, True), (0.05, False)):
-        course, found = growth.start(), []
-        for n in range(300):
-            growth.add(course, [0.05 * n, pace * n, 3.0])
-            found.append(growth.climb(course))
-        assert any(found) == grows
-
-
-@pytest.mark.parametrize(
-    "broken",
-    [
-        None,
-        {},
-        {"rows": 1},
-        {"rows": [1]},
-        {"rows": [["a"]]},
-        {"rows": [[1.0], [1.0, 2.0]]},
-        {"rows": [[1.0]] * 49},
-        {"count": None},
-        {"stride": "1"},
-    ],
-)
-def test_a_torn_course_fits_nothing(broken: Any) -> None:
-    assert not growth.fits(growth.start() | broken if broken else broken)
 
 
 @pytest.mark.mpi

@@ -301,7 +301,7 @@ def slender(d: int) -> None:
         loads={"traction": {"left": along(d, 0.0, "1e3 * t")}},
         contact={"part": "bottom", "stiffness": 1e9, "gap": 1.0},
     ).override(**{"mesh.lengths": [0.02] * (d - 1) + [1.0]})
-    job = right(one, digits=5.0)
+    job = right(one, digits=6.0)
     other = Run(one, backend="petsc")
     for _ in other.steps():
         pass
