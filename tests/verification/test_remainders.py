@@ -220,6 +220,25 @@ def gauss_points_on_a_rigid_foundation(d: int) -> None:
                 assert -forces(job, d).sum(axis=0)[-1] == pytest.approx(1.0, rel=0.05)
 
 
+@check
+def shares_beside_a_clamped_edge(d: int) -> None:
+    """Gauss points whose force a support takes in part have the least share too, whichever way the solver came."""
+    one = scene(
+        d,
+        [2, 1] if d == 2 else [2, 1, 1],
+        time={"steps": 1},
+        elasticity=elasticity(d, 1.0, 0.25),
+        supports={"displacement": ["top", "left"]},
+        loads={"body": along(d, -0.02), "traction": {"right": along(d, -0.01, 0.02)}},
+        contact={"part": "bottom", "stiffness": 90.0, "quadrature": "gauss-3", "friction": {"cohesion": 0.005}},
+    ).override(**{"mesh.lengths": [1.0] * (d - 1) + [0.1]})
+    other = Run(one, backend="petsc")
+    for _ in other.steps():
+        pass
+    found, again = forces(right(one), d), forces(other, d)
+    assert np.abs(found[:, 0]).max() > 1e-4 and np.abs(found - again).max() <= 1e-12 * np.abs(found).max()
+
+
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", check.names)
 def test_remainders(name: str, d: int) -> None:

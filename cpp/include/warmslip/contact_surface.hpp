@@ -51,6 +51,8 @@ class ContactSurface {
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
   /// The same for scalars, one value a node and a point: (points, nodes).
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
+  /// Without the nodes whose displacement is prescribed: forces there move nothing.
+  const Eigen::SparseMatrix<double, Eigen::RowMajor>& moving_shape() const { return moving_shape_; }
 
  private:
   const Layout<d>& layout_;
@@ -59,7 +61,7 @@ class ContactSurface {
   std::vector<bool> prescribed_;
   std::vector<Eigen::Index> own_nodes_;
   Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
-  Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_, moving_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
   RealTable<d> positions_, normals_;
   Eigen::VectorXd weights_;

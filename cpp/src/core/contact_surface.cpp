@@ -98,6 +98,9 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   scalar_shape_.resize(count, nodes());
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
 
+  moving_shape_ = scalar_shape_;
+  moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return free_[node * d] != 0; });
+
   std::vector<int> touched(static_cast<std::size_t>(nodes()), 0);  // points that a node moves
   for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];
   own_nodes_.assign(static_cast<std::size_t>(count), -1);

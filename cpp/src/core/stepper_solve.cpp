@@ -128,7 +128,7 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
   const Timed timed(cost_.contact_seconds);
   solution = contact_->solve(posed_, guess);
   if (solution.converged && surface_.points() > surface_.nodes())
-    share_least(posed_, surface_.scalar_shape(), options_.contact.tolerance, solution);
+    share_least(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
