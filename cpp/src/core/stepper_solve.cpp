@@ -94,18 +94,22 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
 // of the free velocity would else be that of a penetration far smaller.
 template <int d>
 void Stepper<d>::settle(const ContactSolution<d>& contact, Vec w, Vec moved) const {
+  std::vector<Eigen::Index> closed;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i)
+    if (surface_.own_node(i) >= 0 && contact.status[static_cast<std::size_t>(i)] != Status::open) closed.push_back(i);
+  if (closed.empty()) return;
   const Eigen::VectorXd nodal = surface_.nodal_values(w);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(nodal.size());
-  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+  for (const Eigen::Index i : closed) {
     const Eigen::Index node = surface_.own_node(i);
     const auto point = static_cast<std::size_t>(i);
-    if (node < 0 || contact.status[point] == Status::open) continue;
     const Point<d> velocity = nodal.segment<d>(node * d);
     change.segment<d>(node * d) =
         settled<d>(posed_.law(point), posed_.points[point], options_.k, contact.status[point],
                    contact.force.template segment<d>(i * d), posed_.free.template segment<d>(i * d), velocity) -
         velocity;
   }
+  if (change.isZero(0)) return;
   surface_.add(change, w);
   if (moved) surface_.add(change, moved);
 }
