@@ -137,7 +137,8 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
     const Mandel<d> strain = material.elasticity->colPivHouseholderQr().solve(to_mandel<d>(*material.expansion));
     free_expansion_ = std::max(free_expansion_, length * strain.norm());
   }
-  force_magnitudes_ = force_external_ = heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
+  heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
+  force_magnitudes_ = force_external_ = Eigen::VectorXd::Zero(layout.owned() * d);
   interpolate_anew();
 }
 
@@ -213,8 +214,12 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
                    within = u * row(elastic_rows_) + w * row(viscous_rows_),
                    magnitude = moved + given + within + theta * row(expansion_rows_);
       const bool fixed = clamped_[static_cast<std::size_t>(i)];
-      force_magnitudes_[i] = fixed ? 0 : magnitude;
-      force_external_[i] = fixed ? 0 : moved + given;
+      // a force in one direction has no rounding in another, in which the body may be free to move
+      const Point<d> outer =
+          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
+      force_external_.template segment<d>(i * d) = outer;
+      force_magnitudes_.template segment<d>(i * d) =
+          fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
       if (fixed) {
         force.add(position, external - left, magnitude);
         l.support_work += in.k * left.dot(way);
