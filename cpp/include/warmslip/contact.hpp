@@ -134,8 +134,8 @@ struct PointResidual {
 
   /// Of a piecewise linear law the derivative (d = 2) depends on this alone.
   int key() const {
-    return (smooth ? 100000 : 0) + (apart ? 10000 : 0) + (pressed ? 1000 : 0) + (touching ? 100 : 0) + static_cast<int>(status) * 10 +
-           slip_sign;
+    return (smooth ? 100000 : 0) + (apart ? 10000 : 0) + (pressed ? 1000 : 0) + (touching ? 100 : 0) +
+           static_cast<int>(status) * 10 + slip_sign;
   }
 };
 
