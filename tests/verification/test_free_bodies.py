@@ -121,6 +121,27 @@ def slides_without_friction(d: int) -> None:
                 assert momentum(job)[0] == pytest.approx(MASS[d] * 1e-5 / end, rel=1e-5)
 
 
+@check
+def flight_makes_no_heat(d: int) -> None:
+    """Rigid motions strain nothing: what rounding of them heats is no temperature, in whatever steps and materials."""
+    flights = along(d, -1.0), ["-y", "x", 0.0][:d]
+    for coupling in ("staggered", "lagged", "monolithic"):
+        for end in (0.01, 1.0, 1e3):
+            for capacity, conductivity in ((1.0, 1.0), (1e6, 50.0), (1e-3, 1e3)):
+                for velocity in flights:
+                    one = scene(
+                        d,
+                        3 if d == 2 else 2,
+                        time={"end": end, "steps": 5, "coupling": coupling},
+                        inertia={"density": 1.0},
+                        elasticity=elasticity(d, 1e3, 0.3),
+                        heat=heated(d, -1e3, capacity=capacity, conductivity=conductivity),
+                        initial={"velocity": velocity},
+                    )
+                    theta = np.abs(field(right(one, digits=4.0), "theta")).max()
+                    assert theta <= 1e-12 * 1e3 * end / capacity, (coupling, end, capacity, theta)
+
+
 def dense(operator: Any) -> Any:
     """A matrix of PETSc from its products with unit vectors."""
     x, y = operator.createVecs()
