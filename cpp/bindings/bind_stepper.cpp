@@ -43,13 +43,21 @@ void bind(py::module_& m) {
           "Sets the state; None for a field the problem does not have.")
       .def(
           "resume",
-          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status) {
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 5>& scales) {
             std::vector<Status> statuses;
             for (const int one : status) statuses.push_back(static_cast<Status>(one));
-            s.resume(force, statuses);
+            s.resume(force, statuses, {scales[0], scales[1], scales[2], scales[3], scales[4]});
           },
-          py::arg("contact_force"), py::arg("status"),
-          "After `start`: the contact points of the step before, for the same next step to the last bit.")
+          py::arg("contact_force"), py::arg("status"), py::arg("scales"),
+          "After `start`: the contact points of the step before and the scales so far, for the same next step to the "
+          "last bit.")
+      .def_property_readonly(
+          "scales",
+          [](const S& s) {
+            const FieldScales& f = s.scales();
+            return std::array<double, 5>{f.u, f.theta, f.stress, f.force, f.contact_force};
+          },
+          "Largest displacement, temperature, stress, nodal force and contact force so far.")
       .def("forget", &S::forget, "Drops what is remembered of earlier steps beside the state.")
       .def(
           "advance",

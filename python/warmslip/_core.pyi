@@ -1187,13 +1187,18 @@ class Stepper2:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], scales: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
         """
-        After `start`: the contact points of the step before, for the same next step to the last bit.
+        After `start`: the contact points of the step before and the scales so far, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Sets the state; None for a field the problem does not have.
+        """
+    @property
+    def scales(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+        """
+        Largest displacement, temperature, stress, nodal force and contact force so far.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1351,13 +1356,18 @@ class Stepper3:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], scales: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
         """
-        After `start`: the contact points of the step before, for the same next step to the last bit.
+        After `start`: the contact points of the step before and the scales so far, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Sets the state; None for a field the problem does not have.
+        """
+    @property
+    def scales(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+        """
+        Largest displacement, temperature, stress, nodal force and contact force so far.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

@@ -85,6 +85,7 @@ def save(folder: Path, job: Run) -> None:
         "errors": job.errors,
         "newton_max": job.newton_max,
         "stages": job.stages,
+        "scales": list(stepper.scales),
         "seen": job.watch.seen,
     }
     arrays = {name: values for name, values in fields.items() if values is not None}
@@ -148,6 +149,8 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
             and worst.keys() == job.worst.keys()
             and errors.keys() <= set(ESTIMATED)
             and all(type(v) is float for v in (*worst.values(), *errors.values()))
+            and len(record["scales"]) == len(job.stepper.scales)
+            and all(type(v) is float and 0 <= v < math.inf for v in record["scales"])
             and job.watch.fits(record["seen"])
             and all(type(count) is int and count >= 0 for count in counts)
             and 0 < record["step"] <= job.scene.time.steps
@@ -199,7 +202,7 @@ def load(folder: Path, job: Run) -> int:
     nodes = len(job.discretisation.mesh.nodes)
     u, w, theta = (arrays.get(name, np.zeros((nodes, 1))) for name in FIELDS)
     job.discretisation.state(job.stepper, u, w, theta, float.fromhex(record["time"]))
-    job.stepper.resume(arrays["contact_force"], arrays["status"].tolist())
+    job.stepper.resume(arrays["contact_force"], arrays["status"].tolist(), record["scales"])
     job.worst, job.errors = record["worst"], record["errors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
     job.watch.seen |= record["seen"]

@@ -78,7 +78,8 @@ def test_a_resumed_run_ends_the_same(tmp_path: Path, more: tuple[str, ...], step
     assert again.outcome == "right"
     for name in ("u", "w", "theta"):
         assert np.array_equal(getattr(whole, name), getattr(again, name))
-    assert again.summary["identities"] == whole.summary["identities"]
+    for told in ("identities", "digits"):
+        assert again.summary[told] == whole.summary[told]
     assert again.summary["steps"] == 24
     same(tmp_path / "whole", tmp_path / "torn")
     assert not any((tmp_path / "torn" / name).exists() for name in checkpoint.NAMES)
@@ -251,11 +252,11 @@ def test_ctrl_c_ends_with_its_own_exit_code(tmp_path: Path, ranks: int) -> None:
     program = str(Path(sys.executable).parent / "warmslip")
     long = ["run", "paper_mixed", "--set", "mesh.n=8", "--set", "time.steps=100000", "--out", str(tmp_path)]
     process = subprocess.Popen([*start, program, *long], env=child_environment(), stdout=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not (tmp_path / "checkpoint.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=300)
     assert process.returncode == 130 or ranks > 1  # mpirun has an exit code of its own
     assert process.returncode != 0 and "--resume goes on" in said
 

@@ -42,7 +42,7 @@ def said_by(command: str, folder: Path) -> tuple[str, int]:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             check=False,
-            timeout=120,
+            timeout=300,
         )
         return done.stdout, done.returncode
     told = io.StringIO()

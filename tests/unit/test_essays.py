@@ -28,7 +28,7 @@ def test_an_essay_runs(essay: Path, tmp_path: Path) -> None:
         text=True,
         capture_output=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout

@@ -70,7 +70,7 @@ def test_no_step_divides_by_zero_overflows_or_makes_a_nan(tmp_path: Path, ranks:
         text=True,
         capture_output=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     assert result.returncode == 0, result.stdout + result.stderr
     assert result.stdout.count(": right") == ranks * len(SCENES)

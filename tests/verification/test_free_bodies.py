@@ -1,137 +1,200 @@
-"""Bodies without supports and inertia: what nothing holds is refused on every part alike, what contact holds is found.
+"""Bodies without supports: coupled with heat at the new time level, and free to slide on their foundation.
 
-The foundation may be away at the start. `python test_free_bodies.py D` checks on the ranks it has.
+`python test_free_bodies.py` checks all of it on the ranks it has.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from boxes import elasticity, right, scene
+from boxes import along, elasticity, field, right, scene
 from ranked import Checks, on_two_ranks
 
-from warmslip import Run, _core, discretise
-from warmslip.materials import make_mesh
+from warmslip import Run, Scene
 
-PARTS = {2: {"left": 0, "right": 0, "bottom": 1, "top": 1}}
-PARTS[3] = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
-FAR = ("right", "top", "back")
 check = Checks()
+EXPANSION = 2.0
+MASS = {d: 7.85e-9 * 10.0**d for d in (2, 3)}
 
 
-def inwards(d: int, part: str, along: float = 0.0) -> list[float]:
-    """A unit of load that presses on a part, and some along the next axis."""
-    axis = PARTS[d][part]
-    load = [0.0] * d
-    load[axis] = 1.0 if part in FAR else -1.0
-    load[(axis + 1) % d] = along
-    return load
+def turned(d: int) -> list[list[float]]:
+    """A heating tensor that is no multiple of the expansion's: the coupled operator is not symmetric."""
+    tensor = -np.diag([1.0, 2.0, 1.0][:d])
+    tensor[0, 1] = tensor[1, 0] = 0.3
+    return tensor.tolist()
 
 
-def free(d: int, part: str, load: Any, mu: float = 0.5, n: int = 2, **contact: Any) -> Any:
-    friction = {"friction": {"coefficient": mu}} if mu else {}
+def heated(d: int, heating: Any, **more: Any) -> dict[str, Any]:
+    return {
+        "conductivity": 50.0,
+        "capacity": 3.6,
+        "expansion": {"tensor": EXPANSION},
+        "heating": {"tensor": heating},
+    } | more
+
+
+def couplings(d: int) -> tuple[Any, ...]:
+    """R = -M, no heating, and no multiple of M: a symmetric and two unsymmetric operators."""
+    return -EXPANSION, 0.0, turned(d)
+
+
+def steel(d: int, n: int, end: float, **tables: Any) -> Scene:
+    """A block of 10 mm in mm, t and s; its waves cross it in 2e-6 s."""
     return scene(
         d,
         n,
-        time={"steps": 2},
-        elasticity=elasticity(d, 1000.0, 0.3),
-        loads={"body": load},
-        contact={"part": part, "stiffness": 1e5} | friction | contact,
+        length=10.0,
+        time={"end": end, "steps": 4, "coupling": "monolithic"},
+        inertia={"density": 7.85e-9},
+        elasticity=elasticity(d, 210000.0, 0.3),
+        **tables,
     )
 
 
-def turned(one: Any, turn: Any) -> Any:
-    """The scene and its mesh about the origin; `turn` (d, d) is orthonormal."""
-    mesh = make_mesh(one)
-    kind = getattr(_core, f"Mesh{len(turn)}")
-    parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
-    body = (turn @ np.array(one.loads.body)).tolist()
-    return one.override(**{"loads.body": body}), kind.from_lists(np.array(mesh.nodes) @ turn.T, mesh.cells, parts)
-
-
-def outcome(one: Any, mesh: Any = None) -> str:
-    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
-    assert not list(job.steps()) or job.outcome == "right"
-    return job.outcome
-
-
-def unheld(d: int, part: str) -> Iterator[Any]:
-    """Scenes that have no solution, or a whole line of them."""
-    for stiffness in (1e5, "rigid"):
-        away = [-one for one in inwards(d, part)]
-        yield free(d, part, away, stiffness=stiffness)
-        yield free(d, part, away, stiffness=stiffness, gap=0.01)
-        yield free(d, part, inwards(d, part, 0.6), stiffness=stiffness)  # more than mu
-        yield free(d, part, inwards(d, part, -0.6), stiffness=stiffness, gap=0.01)
-        yield free(d, part, inwards(d, part, 0.1), mu=0, stiffness=stiffness)
-        yield free(d, part, inwards(d, part), mu=0, stiffness=stiffness)
+def momentum(job: Run) -> Any:
+    return job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
 
 
 @check
-def what_nothing_holds_is_refused_on_every_part(d: int) -> None:
-    for part in PARTS[d]:
-        assert {outcome(one) for one in unheld(d, part)} == {"unsupported"}, part
+def warm_flight(d: int) -> None:
+    """Uniform heat in free flight: the body expands about its centre as E^-1 M theta I, and the centre flies on."""
+    stiffness = 210000.0 / (1 - 2 * 0.3) / (1.3 if d == 2 else 1.0)
+    for heating in couplings(d):
+        for end in (1e-3, 1e4):
+            flight = np.asarray(along(d, 10.0, -3.0))
+            job = right(
+                steel(
+                    d,
+                    4 if d == 2 else 2,
+                    end,
+                    heat=heated(d, heating, source=f"{36.0 / end}"),
+                    initial={"velocity": list(flight / end)},
+                )
+            )
+            exact = MASS[d] * flight / end
+            assert np.abs(momentum(job) - exact).max() <= 1e-13 * np.abs(exact).max()
+            if end < 1:
+                continue  # elastic waves have not died away
+            strain = EXPANSION / stiffness
+            theta = 36.0 / (3.6 - strain * (np.trace(heating) if isinstance(heating, list) else d * heating))
+            x = np.asarray(job.discretisation.mesh.nodes) - 5.0
+            assert np.abs(field(job, "theta") - theta).max() <= 1e-11 * theta
+            assert np.abs(field(job, "u") - flight - strain * theta * x).max() <= 1e-12 * np.abs(flight).max()
 
 
 @check
-def and_whichever_way_it_is_turned(d: int) -> None:
-    turn = np.linalg.qr(np.random.default_rng(d).normal(size=(d, d)))[0]
-    turn[0] *= np.sign(np.linalg.det(turn))
-    for part in PARTS[d]:
-        assert {outcome(*turned(one, turn)) for one in unheld(d, part)} == {"unsupported"}, part
+def warm_and_held_by_contact(d: int) -> None:
+    """Statics whatever the coupling, from steps of the waves' transit to some that are a billion times as long."""
+    for heating in couplings(d):
+        for end in (1e-2, 1.0, 1e4):
+            job = right(
+                steel(
+                    d,
+                    3,
+                    end,
+                    heat=heated(d, heating, source=f"{1.0 / end} * x"),
+                    loads={"traction": {"top": along(d, -1.0)}},
+                    contact={"part": "bottom", "stiffness": 1e6, "friction": {"coefficient": 0.2}},
+                )
+            )
+            assert job.report.normal_force == pytest.approx(10.0 ** (d - 1), rel=1e-8)
 
 
 @check
-def it_comes_to_its_foundation(d: int) -> None:
-    """A gap that a rigid motion closes, of 1 % or of fifty bodies, leaves the forces that there are without one."""
-    for part, axis in PARTS[d].items():
-        load = inwards(d, part, 0.1)
-        across = "yx"[axis] if d == 2 else "yzx"[axis]
-        slope = f"0.01 + 0.02 * {across}" if part not in FAR else 0.02  # beyond the origin a turn slides, too
-        for stiffness in (1e3, "rigid"):
-            near = right(free(d, part, load, stiffness=stiffness))
-            force = np.reshape(near.stepper.contact_force, (-1, d))
-            assert np.abs(force.sum(axis=0) - load).max() <= 1e-11
-            for gap in (0.01, slope, 50.0):
-                far = right(free(d, part, load, stiffness=stiffness, gap=gap), digits=6.0)
-                there = np.reshape(far.stepper.contact_force, (-1, d))
-                assert np.abs(there - force).max() <= 1e-9, (part, stiffness, gap)
+def slides_without_friction(d: int) -> None:
+    """Nothing resists a motion along the foundation: the speed stays, however long the steps and heavy the load."""
+    for n in (3, 6) if d == 2 else (2, 3):
+        for end in (1.0, 1e3, 1e5):
+            for coupling in ("staggered", "monolithic"):
+                one = steel(
+                    d,
+                    n,
+                    end,
+                    heat=heated(d, -EXPANSION),
+                    loads={"traction": {"top": along(d, -1.0)}},
+                    initial={"velocity": along(d, 0.0, 1e-5 / end)},
+                    contact={"part": "bottom", "stiffness": 1e6, "friction": {"coefficient": 0.0}},
+                )
+                job = right(one.override(**{"time.coupling": coupling}))
+                assert momentum(job)[0] == pytest.approx(MASS[d] * 1e-5 / end, rel=1e-5)
 
 
 @check
-def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
-    """Statics: on a curved foundation the load's centre, 5/9, lies between the rows at 1/2 and 1, that take 4/3 and 1/6."""
-    body = [0.0] * (d - 1) + ["-1 - x"]
-    for gap in ("0.01 + 0.1 * (x - 0.3)**2", "0.1 * (x - 0.3)**2"):
-        job = right(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
-        force = np.reshape(job.stepper.contact_force, (-1, d))[:, -1]
-        place = np.asarray(job.discretisation.surface.positions)[:, 0]
-        rows = [-force[np.abs(place - x) < 0.1].sum() for x in (0.0, 0.5, 1.0)]
-        assert rows == pytest.approx([0.0, 4 / 3, 1 / 6], abs=1e-11)
-    balanced = free(d, "bottom", [0.0] * (d - 1) + [-1.0], stiffness="rigid", gap="0.01 + 0.1 * (x - 0.5)**2")
-    assert outcome(balanced) == "unsupported"  # on one row of points, about which it may turn
+def flight_makes_no_heat(d: int) -> None:
+    """Rigid motions strain nothing: what rounding of them heats is no temperature, in whatever steps and materials."""
+    flights = along(d, -1.0), ["-y", "x", 0.0][:d]
+    for coupling in ("staggered", "lagged", "monolithic"):
+        for end in (0.01, 1.0, 1e3):
+            for capacity, conductivity in ((1.0, 1.0), (1e6, 50.0), (1e-3, 1e3)):
+                for velocity in flights:
+                    one = scene(
+                        d,
+                        3 if d == 2 else 2,
+                        time={"end": end, "steps": 5, "coupling": coupling},
+                        inertia={"density": 1.0},
+                        elasticity=elasticity(d, 1e3, 0.3),
+                        heat=heated(d, -1e3, capacity=capacity, conductivity=conductivity),
+                        initial={"velocity": velocity},
+                    )
+                    theta = np.abs(field(right(one, digits=4.0), "theta")).max()
+                    assert theta <= 1e-12 * 1e3 * end / capacity, (coupling, end, capacity, theta)
 
 
-@check
-def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
-    one = free(d, "bottom", [0.0] * (d - 1) + ["4 * t - 2.6"], gap=0.01).override(**{"time.steps": 4})
-    job = Run(one)
-    assert (len(list(job.steps())), job.outcome) == (2, "unsupported")
-    assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
+def dense(operator: Any) -> Any:
+    """A matrix of PETSc from its products with unit vectors."""
+    x, y = operator.createVecs()
+    columns = []
+    for column in range(operator.getSize()[1]):
+        x.set(0.0)
+        x[column] = 1.0
+        x.assemble()
+        operator.mult(x, y)
+        columns.append(y.array.copy())
+    return np.column_stack(columns)
+
+
+@pytest.mark.parametrize("density", [1e-3, 1.0, 100.0])
+def test_an_indefinite_coupling_is_refused_and_no_other(density: float) -> None:
+    """R = +M of a free body, to six digits of the size at which the coupled operator ceases to be positive definite."""
+    k, unit = 0.1, 1e-3
+
+    def coupled(size: float) -> Scene:
+        return scene(
+            2,
+            1,
+            time={"end": k, "steps": 1, "coupling": "monolithic"},
+            inertia={"density": density},
+            elasticity=elasticity(2, 1.0, 0.3),
+            heat={
+                "conductivity": 1.0,
+                "capacity": 1.0,
+                "expansion": {"tensor": size},
+                "heating": {"tensor": size},
+            },
+        )
+
+    operators = Run(coupled(unit)).discretisation.operators
+    heat = dense(operators.mass) / k + dense(operators.conductivity)
+    motion = dense(operators.inertia) / k + k * dense(operators.elasticity)
+    expansion = dense(operators.expansion) / unit
+    fed = np.linalg.solve(motion, expansion @ np.linalg.solve(heat, expansion.T))
+    limit = 1 / np.sqrt(np.abs(np.linalg.eigvals(fed)).max())
+    Run(coupled(limit * (1 - 1e-6)))
+    with pytest.raises(ValueError, match="indefinite"):
+        Run(coupled(limit * (1 + 1e-6)))
 
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", check.names)
-def test_on_one_rank(name: str, d: int) -> None:
+def test_free_bodies(name: str, d: int) -> None:
     check.run(name, d)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("d", [2, 3])
-def test_on_two_ranks(d: int) -> None:
+def test_free_bodies_on_two_ranks(d: int) -> None:
     on_two_ranks(__file__, d, check)
 
 

@@ -253,7 +253,7 @@ def step_from(scene: Scene, starts: list[Array], force: Array | None, penetratio
     out = []
     for start in starts:
         stepper = d.stepper()
-        stepper.resume(start.ravel(), [1] * len(start))
+        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 5)
         loads = list(d.load_vectors.at(scene.step, scene.step))
         if force is not None:
             vector = d.layout.vector(d.dim)
@@ -382,7 +382,7 @@ def test_two_ranks_say_the_same() -> None:
 
     command = ["mpirun", "-n", "2", sys.executable, str(Path(__file__).resolve())]
     result = subprocess.run(
-        command, env=child_environment(), text=True, capture_output=True, timeout=120, check=False, cwd=Path.cwd()
+        command, env=child_environment(), text=True, capture_output=True, timeout=300, check=False, cwd=Path.cwd()
     )
     assert result.returncode == 0, result.stdout + result.stderr
     assert result.stdout.count(str(rough_and_smooth())) == 2, result.stdout

@@ -34,9 +34,10 @@ struct ContactProblem {
 };
 
 /// Rigid motions that the compliance leaves out: with their velocities a, the points move at
-/// free - C lambda + motions a, and the load on them is balanced by motions^T lambda + inertia a.
+/// free - C lambda + motions a, and the load on them is balanced by loads^T lambda + inertia a.
 struct RigidCoupling {
   Eigen::MatrixXd motions;  ///< (d points, motions), dimensionless
+  Eigen::MatrixXd loads;    ///< likewise; `motions` unless the operator is not symmetric
   Eigen::MatrixXd inertia;  ///< (motions, motions), force per velocity
 
   Eigen::Index count() const { return inertia.rows(); }
@@ -86,11 +87,20 @@ class ContactSolver {
  private:
   struct Linearisation;
   struct Trial;
+  // A point in contact in the dense tangent: all components of its force, or the normal one where no friction acts.
+  struct Closed {
+    using Basis = Eigen::Matrix<double, d, Eigen::Dynamic, Eigen::ColMajor, d, d>;
+    Eigen::Index row, at;  // its first component among all, and in the tangent
+    Basis basis;           // of the force that is sought, orthonormal
+
+    Eigen::Index size() const { return basis.cols(); }
+  };
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
   void factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution);
   Eigen::VectorXd direction(const Linearisation& at) const;
+  Tensor2<d> shared(const ContactProblem<d>& problem, const PointResidual<d>& at, Eigen::Index point) const;
   bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
@@ -103,15 +113,15 @@ class ContactSolver {
   Eigen::MatrixXd compliance_;
   ContactOptions options_;
   RigidCoupling rigid_;
-  double boldness_ = 1;               // of the tangential rows, against the reciprocal of the point's own compliance
-  Eigen::MatrixXd carried_;           // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
-  double share_ = 0;                  // > 0: pressed points share their force on a stiff foundation as on a rigid one
-  double leash_ = 0;                  // > 0: force per velocity that holds a body without mass while nothing else does
-  bool carries_ = false;              // whether a point's own compliance includes the rigid motions
-  double give_ = 1;                   // velocity per force, the unit of the rigid motions
-  double spectral_ = 0;               // largest row sum of |compliance|, a bound on its eigenvalues
-  std::vector<int> factored_;         // statuses the tangent below belongs to
-  std::vector<Eigen::Index> closed_;  // its rows: the components of the points in contact
+  double boldness_ = 1;         // of the tangential rows, against the reciprocal of the point's own compliance
+  Eigen::MatrixXd carried_;     // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
+  double share_ = 0;            // > 0: pressed points share their force on a stiff foundation as on a rigid one
+  double leash_ = 0;            // > 0: force per velocity that holds a body without mass while nothing else does
+  bool carries_ = false;        // whether a point's own compliance includes the rigid motions
+  double give_ = 1;             // velocity per force, the unit of the rigid motions
+  double spectral_ = 0;         // largest row sum of |compliance|, a bound on its eigenvalues
+  std::vector<int> factored_;   // statuses the tangent below belongs to
+  std::vector<Closed> closed_;  // its rows: the points in contact
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };
 

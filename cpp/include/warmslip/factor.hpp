@@ -9,8 +9,15 @@
 namespace warmslip {
 
 enum class Backend { automatic, cholmod, petsc };
-/// `definite_or_refused`: positive definite unless the data make it indefinite, which is refused.
+/// `definite_or_refused`: positive definite unless the data make it indefinite, which is refused with
+/// `indefinite_coupling`.
 enum class Symmetry { positive_definite, definite_or_refused, symmetric, general };
+
+constexpr const char* indefinite_coupling =
+    "time.coupling: the coupled operator is indefinite: a coupling R = +M of this size feeds in more energy than a "
+    "step "
+    "of inertia, viscosity and elasticity holds; give heat.heating the sign of -M, a smaller tensor, viscosity, or "
+    "coupling = \"staggered\"";
 
 /// K with the unknowns `trailing` (E selects them): x = K^-1 (r - E load) in two halves around the contact problem.
 class Factor {
@@ -29,6 +36,9 @@ class Factor {
 
   /// x = K^-1 r.
   void solve(Vec r, Vec x);
+  /// Whether K was said to be symmetric, and x = K^-T r.
+  virtual bool symmetric() const { return true; }
+  virtual void solve_transposed(Vec r, Vec x) { solve(r, x); }
   int substitutions() const { return substitutions_; }  ///< forward and backward pairs so far
 
  protected:

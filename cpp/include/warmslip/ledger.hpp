@@ -87,6 +87,7 @@ class Bookkeeper {
   void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  double temperature_of_rounding(const Level& before, const Level& after, double k) const;
   void interpolate_anew();
   Eigen::VectorXd at_points(Vec v) const;
   void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
@@ -100,6 +101,11 @@ class Bookkeeper {
   VecHandle contact_heat_, contact_heat_size_;  // heat that leaves at the contact points, and its magnitudes
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;  // hat functions at the contact points, found anew from positions
+  struct RowSizes {
+    double sum = 0, most = 0;
+  };
+  RowSizes heating_, mass_, conduction_, exchange_;     // of the rows of the heat equation
+  bool any_cooled_ = false;                             // whether a temperature is given
   Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
   Eigen::VectorXd force_external_, heat_external_;      // but for the inner forces and the conduction
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements

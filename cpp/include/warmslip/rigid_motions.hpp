@@ -12,6 +12,11 @@
 // V = K~^-1 M' Z, W = Z - V = K~^-1 P Z, H = Z^T M' W and W_c = E^T W. No term of the equations for a is a difference
 // of large numbers. This is the deflation of floating subdomains of FETI (Farhat & Roux, Int. J. Numer. Meth. Engng 32,
 // 1991), with the mass kept.
+//
+// The coupled operator of displacement and temperature has the same inner part in this sense: thermal stresses do no
+// work in a rigid motion, and a rigid motion makes no heat. Where the operator is not symmetric, V and W_c of the
+// second equation belong to its transpose. K is positive definite if and only if K~ and H are, because
+// H = Z^T P (P^-1 - K~^-1) P Z on the springs.
 #pragma once
 #include <functional>
 #include <vector>
@@ -28,26 +33,27 @@ class RigidMotions {
 
   RigidMotions() = default;
   /// Rigid motions (block d) or constants (block 1) of the parts of the mesh that hang together and have no node in the
-  /// `fixed` parts; displacement by x - centre over the size of the part, dimensionless. `avoid`: nodes that get no
-  /// spring where others will do.
+  /// `fixed` parts; displacement by x - centre over the size of the part, dimensionless. The operator has `width`
+  /// unknowns a node, those of the motion first. `avoid`: nodes that get no spring where others will do.
   template <int d>
-  RigidMotions(const Layout<d>& layout, int block, const std::vector<std::string>& fixed,
+  RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
                const std::vector<std::string>& avoid);
 
   bool empty() const { return motions_.empty(); }
   Eigen::Index count() const { return static_cast<Eigen::Index>(motions_.size()); }
   /// K -> K~.
   void add_springs(Mat k);
-  /// V, W and H for a factored K~ and the mass M'.
+  /// V, W and H for a factored K~ and the mass M', which acts on vectors of the motion's unknowns.
   void prepare(Factor& factor, const Apply& mass);
 
-  /// Z^T b_ext - V^T b (collective).
+  /// Z^T b_ext - V^T b (collective); b_ext has the motion's unknowns alone.
   Eigen::VectorXd load(Vec external, Vec all) const;
+  /// Whether no motion has less than no inertia: H has no negative eigenvalue.
+  bool holds() const;
   /// The motions a without contact. Throws SolveFailed when there is no mass to hold them.
   Eigen::VectorXd alone(const Eigen::VectorXd& load) const;
-  /// inner -= V a, then x = inner + Z a: with inner = K~^-1 (b - E lambda) the solution, and the part of it that
-  /// strains.
-  void add(const Eigen::VectorXd& motions, Vec inner, Vec x) const;
+  /// inner -= V a: of the solution K~^-1 (b - E lambda), the part that strains. `carry` adds Z a.
+  void strain(const Eigen::VectorXd& motions, Vec inner) const;
   /// x -= the motion that is nearest to it, in the sum of squares over the nodes; its components.
   Eigen::VectorXd remove(Vec x) const;
   /// x += Z a
@@ -56,14 +62,22 @@ class RigidMotions {
   const Eigen::MatrixXd& inertia() const { return inertia_; }  ///< H
   double share() const { return share_; }  ///< the largest entry of V: how far the mass holds the motions by itself
   Vec motion(Eigen::Index i) const { return motions_[static_cast<std::size_t>(i)]; }  ///< a column of Z
-  Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }     ///< a column of W
+  /// A column of W, the motion's unknowns alone, of K~ and of its transpose.
+  Vec along(Eigen::Index i) const { return along_[static_cast<std::size_t>(i)]; }
+  Vec along_transposed(Eigen::Index i) const {
+    return (along_transposed_.empty() ? along_ : along_transposed_)[static_cast<std::size_t>(i)];
+  }
 
  private:
+  using Solve = std::function<void(Vec, Vec)>;
   Eigen::VectorXd dots(const std::vector<VecHandle>& with, Vec x) const;
   void combine(const std::vector<VecHandle>& of, const Eigen::VectorXd& by, Vec x) const;
+  void respond(const Solve& solve, const Apply& mass, std::vector<VecHandle>& inner, std::vector<VecHandle>& along);
 
-  std::vector<VecHandle> motions_, inner_, along_;  // Z, V, W
-  std::vector<PetscInt> springs_;                   // global unknowns, one a motion
+  VecHandle right_;                                             // a vector of the operator
+  std::vector<VecHandle> motions_, inner_, along_;              // Z, V, W
+  std::vector<VecHandle> inner_transposed_, along_transposed_;  // V, W of the transpose, empty where they are the same
+  std::vector<PetscInt> springs_;                               // global unknowns, one a motion
   std::vector<double> stiffness_;
   double share_ = 0;
   Eigen::MatrixXd inertia_, gram_, at_springs_;  // H, Z^T Z, Z at the springs

@@ -47,6 +47,11 @@ struct Errors {
   double largest() const;
 };
 
+/// Largest values of the fields so far, which their errors are relative to.
+struct FieldScales {
+  double u = 0, theta = 0, stress = 0, force = 0, contact_force = 0;
+};
+
 /// Data of one step: load vectors `force` (f, v) and `heat` (q, eta), k_c theta_F included, `gap` g (points); what
 /// belongs to an absent block is null or empty.
 struct StepLoads {
@@ -93,10 +98,10 @@ class Stepper {
           const ContactSurface<d>& surface, StepperOptions options);
 
   /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
-  /// goes on passes the contact forces and statuses of its last step as well: the next step is then the same to the
-  /// last bit as that of a stepper that was told to `forget` there.
+  /// goes on passes the contact forces and statuses of its last step and the scales so far as well: the next step is
+  /// then the same to the last bit as that of a stepper that was told to `forget` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
-  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status);
+  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldScales& scales);
   /// Drops what is remembered of earlier steps beside the state.
   void forget();
   /// One step. When the outcome is not `right`, the state is the last good one.
@@ -107,6 +112,7 @@ class Stepper {
   int steps() const { return cost_.steps; }
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
+  const FieldScales& scales() const { return scales_; }
   const ContactSolver<d>* contact_solver() const { return contact_.get(); }  ///< nullptr without contact points
   const ContactProblem<d>& posed() const { return posed_; }                  ///< of the step tried last
   const Cost& cost() const { return cost_; }
@@ -117,10 +123,12 @@ class Stepper {
  private:
   StepReport<d> attempt(const StepLoads& loads);
   void take_factors();
+  void take_motion(Mat a, int width, Symmetry symmetry, const std::string& name);
+  std::vector<std::string> parts_in_contact(bool mechanical) const;
   void take_vectors();
   void momentum_right_side(const StepLoads& loads);
   Eigen::VectorXd reduce(Vec right, Vec external);
-  Eigen::VectorXd expand(const ContactSolution<d>& contact, Vec out, Vec strained);
+  Eigen::VectorXd expand(const ContactSolution<d>& contact, Vec w, Vec theta);
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
   StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
@@ -176,9 +184,7 @@ class Stepper {
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_;  // of the step that is being taken
-  struct {
-    double u = 0, theta = 0, stress = 0, force = 0, contact_force = 0;
-  } scales_;            // largest values so far
+  FieldScales scales_;
   double grazing_ = 1;  // the contact force over a hundredth of the largest force, at most 1
   double time_ = 0;
   Cost cost_;

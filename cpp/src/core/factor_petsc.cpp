@@ -6,7 +6,7 @@ namespace {
 class PetscFactor final : public Factor {
  public:
   PetscFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, const std::string& prefix)
-      : prefix_(prefix) {
+      : prefix_(prefix), symmetric_(symmetry != Symmetry::general) {
     const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(k));
     const bool counted = symmetry == Symmetry::definite_or_refused,
                cholesky = counted || symmetry == Symmetry::positive_definite;
@@ -27,12 +27,7 @@ class PetscFactor final : public Factor {
       throw std::invalid_argument("the " + prefix +
                                   " operator could not be factored: it is singular or its entries "
                                   "are out of range; check the material, the supports and the time step");
-    if (counted && negative_pivots() > 0)
-      throw std::invalid_argument("time.coupling: the " + prefix +
-                                  " operator is indefinite: a coupling R = +M of this size feeds in more energy than a "
-                                  "step of inertia, viscosity "
-                                  "and elasticity holds; give heat.heating the sign of -M, a smaller tensor, "
-                                  "viscosity, or coupling = \"staggered\"");
+    if (counted && negative_pivots() > 0) throw std::invalid_argument(indefinite_coupling);
     WARMSLIP_PETSC(MatCreateVecs(k, free_.out(), right_.out()));
     work_ = duplicate(right_);
 
@@ -57,6 +52,14 @@ class PetscFactor final : public Factor {
     add_load(load);
     solve_for(work_, x);
     WARMSLIP_PETSC(VecAYPX(x, -1, free_));
+  }
+
+  bool symmetric() const override { return symmetric_; }
+
+  void solve_transposed(Vec r, Vec x) override {
+    WARMSLIP_PETSC(VecCopy(r, right_));
+    WARMSLIP_PETSC(KSPSolveTranspose(ksp_, right_, x));
+    count_solve();
   }
 
   const Eigen::MatrixXd& compliance() override {
@@ -102,6 +105,10 @@ class PetscFactor final : public Factor {
 
   void solve_for(Vec right, Vec x) {
     WARMSLIP_PETSC(KSPSolve(ksp_, right, x));
+    count_solve();
+  }
+
+  void count_solve() {
     ++substitutions_;
     if (reason() < 0)
       throw SolveFailed("the " + prefix_ + " solver ended with " + KSPConvergedReasons[reason()] +
@@ -150,6 +157,7 @@ class PetscFactor final : public Factor {
   }
 
   std::string prefix_;
+  bool symmetric_;
   KspHandle ksp_;
   VecHandle right_, free_, work_, held_;
   IsHandle indices_;

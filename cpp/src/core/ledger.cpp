@@ -128,6 +128,13 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   cooled_.resize(clamped_.size());
   for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
   for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+  for (const auto& [rows, size] :
+       {std::pair{&heating_rows_, &heating_}, std::pair{&mass_rows_, &mass_},
+        std::pair{&conduction_rows_, &conduction_}, std::pair{&exchange_rows_, &exchange_}}) {
+    size->sum = layout.sum(rows->size() ? rows->sum() : 0.0);
+    size->most = over_ranks(layout.comm(), std::array{rows->size() ? rows->maxCoeff() : 0.0})[0];
+  }
+  any_cooled_ = layout.sum(static_cast<double>(operators.cooled.size())) > 0;
   double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
   MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
   const double length = (layout.mesh().nodes.colwise().maxCoeff() - layout.mesh().nodes.colwise().minCoeff()).norm();
@@ -137,7 +144,8 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
     const Mandel<d> strain = material.elasticity->colPivHouseholderQr().solve(to_mandel<d>(*material.expansion));
     free_expansion_ = std::max(free_expansion_, length * strain.norm());
   }
-  force_magnitudes_ = force_external_ = heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
+  heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
+  force_magnitudes_ = force_external_ = Eigen::VectorXd::Zero(layout.owned() * d);
   interpolate_anew();
 }
 
@@ -192,6 +200,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
                w_both = std::max(after.sizes.w, before.sizes.w), theta = largest(in.coupling_theta);
+  const bool warm = theta > temperature_of_rounding(before, after, in.k);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
@@ -213,8 +222,12 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
                    within = u * row(elastic_rows_) + w * row(viscous_rows_),
                    magnitude = moved + given + within + theta * row(expansion_rows_);
       const bool fixed = clamped_[static_cast<std::size_t>(i)];
-      force_magnitudes_[i] = fixed ? 0 : magnitude;
-      force_external_[i] = fixed ? 0 : moved + given;
+      // a force in one direction has no rounding in another, in which the body may be free to move
+      const Point<d> outer =
+          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
+      force_external_.template segment<d>(i * d) = outer;
+      force_magnitudes_.template segment<d>(i * d) =
+          fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
       if (fixed) {
         force.add(position, external - left, magnitude);
         l.support_work += in.k * left.dot(way);
@@ -227,7 +240,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       }
       work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
       if (fixed) continue;
-      raise(applied, given + expands);
+      raise(applied, given + (warm ? expands : 0));
       raise(strained, stretches);
       raise(inner, within);
       raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
@@ -251,17 +264,30 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   l.displacement_scale = std::max(l.displacement_scale, 1e-8 * free_expansion_ * std::max(theta, reference_));
 }
 
+// A temperature that rounding of the velocity makes through the heating: at a node against all that holds its
+// temperature, and of the whole body, where none is given, against what holds the constant.
+template <int d>
+double Bookkeeper<d>::temperature_of_rounding(const Level& before, const Level& after, double k) const {
+  const double here = relative(heating_.most, mass_.most / k + conduction_.most + exchange_.most),
+               whole = any_cooled_ ? 0 : relative(heating_.sum, mass_.sum / k + exchange_.sum);
+  return 1e-10 * std::max(after.sizes.w, before.sizes.w) * std::max(here, whole);
+}
+
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.
 template <int d>
 void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
   const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
                stored = 0.5 * dot(after.theta, after.mass_theta);
   double content = 0, content_size = 0, work = 0;
-  enum { defect, backward, acting, carried, stiffness };
-  std::array<double, 5> most{};
+  enum { defect, backward, acting };
+  std::array<double, 3> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = largest(in.coupling_w),
-               speed = std::max(after.sizes.w, before.sizes.w);
+  const double
+      theta = after.sizes.theta,
+      both = std::max(
+          theta, before.sizes.theta),  // a velocity that strains is known to the rounding of one that carries the body:
+                                       // a millionth is as far from it as round-off is from the bound on a balance
+      w = std::max(largest(in.coupling_w), 1e-6 * std::max(after.sizes.w, before.sizes.w));
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
         c(contact_heat_), sizes(contact_heat_size_), values(after.theta), old(before.theta);
@@ -284,8 +310,6 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
         if (magnitude > std::numeric_limits<double>::min()) raise(backward, std::abs(wall) / magnitude);
         if (!std::isfinite(wall)) raise(backward, std::numeric_limits<double>::infinity());
       }
-      raise(carried, speed * at(heating_rows_, i));
-      raise(stiffness, mass_rows_[i] / in.k + conduction_rows_[i] + at(exchange_rows_, i));
       work += in.k * magnitude * (std::abs((*values)[i]) + std::abs((*old)[i]));
       raise(acting, std::max({(std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k, std::abs((*flux)[i]), given}));
     }
@@ -305,7 +329,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                                                         l.supplied, l.heating, l.friction_heating, l.held}) +
                                                 layout_.sum(work))});
   l.heat_defect = relative(most[defect], most[acting]);
-  l.temperature_scale = 1e-11 * relative(most[carried], most[stiffness]);
+  l.temperature_scale = temperature_of_rounding(before, after, in.k);
 }
 
 template class Bookkeeper<2>;

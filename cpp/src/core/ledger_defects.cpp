@@ -60,8 +60,9 @@ void Bookkeeper<d>::add_rounding(Vec defect, Vec external) const {
     for (Eigen::Index a = 0; a < block; ++a) {
       const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
       const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
-      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i];
-      if (external) (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i];
+      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
+      if (external)
+        (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];
     }
 }
 

@@ -48,11 +48,27 @@ Eigen::MatrixXd motions_of(const Mesh<d>& mesh, const std::vector<Index>& nodes,
   return out;
 }
 
+// The unknowns of a motion in a vector of the operator, whose further ones of a node come after them.
+void take_part(Vec whole, Vec part) {
+  const Eigen::Index width = block_size(whole), block = block_size(part);
+  Values from(whole), to(part);
+  const Eigen::Index nodes = (*to).size() / block;
+  (*to).reshaped(block, nodes) = (*from).reshaped(width, nodes).topRows(block);
+}
+
+void put_part(Vec part, Vec whole) {
+  const Eigen::Index width = block_size(whole), block = block_size(part);
+  Values from(part), to(whole);
+  const Eigen::Index nodes = (*from).size() / block;
+  (*to).reshaped(width, nodes).topRows(block) = (*from).reshaped(block, nodes);
+}
+
 }  // namespace
 
 template <int d>
-RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector<std::string>& fixed,
-                           const std::vector<std::string>& avoid) {
+RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
+                           const std::vector<std::string>& avoid)
+    : right_(layout.vector(width)) {
   const Mesh<d>& mesh = layout.mesh();
   const std::vector<Index> root = connected(mesh);
   std::vector<bool> held(root.size(), false), avoided(root.size(), false);
@@ -91,7 +107,7 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, const std::vector
       qr.compute(z.transpose());
     for (Eigen::Index j = 0; j < several; ++j) {
       const Eigen::Index row = qr.colsPermutation().indices()[j];
-      springs_.push_back(layout.global_of(nodes[static_cast<std::size_t>(row / block)]) * block +
+      springs_.push_back(layout.global_of(nodes[static_cast<std::size_t>(row / block)]) * width +
                          static_cast<PetscInt>(row % block));
       Eigen::VectorXd here = Eigen::VectorXd::Zero(first + several);
       here.tail(several) = z.row(row).transpose();
@@ -127,37 +143,50 @@ void RigidMotions::add_springs(Mat k) {
 }
 
 void RigidMotions::prepare(Factor& factor, const Apply& mass) {
+  respond([&](Vec r, Vec x) { factor.solve(r, x); }, mass, inner_, along_);
+  if (!factor.symmetric())
+    respond([&](Vec r, Vec x) { factor.solve_transposed(r, x); }, mass, inner_transposed_, along_transposed_);
   inertia_.resize(count(), count());
   const VecHandle right = duplicate(motions_.front());
-  PetscInt begin, end;
-  WARMSLIP_PETSC(VecGetOwnershipRange(right, &begin, &end));
-  for (Eigen::Index j = 0; j < count(); ++j) {
-    const Vec z = motions_[static_cast<std::size_t>(j)];
-    VecHandle v = duplicate(z), w = duplicate(z);
-    WARMSLIP_PETSC(VecSet(right, 0));
-    mass(z, right);
-    factor.solve(right, v);
-    WARMSLIP_PETSC(VecWAXPY(w, -1, v, z));
-    PetscReal size;
-    WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &size));
-    share_ = std::max(share_, std::min(1.0, size));
-    if (size > 0.5) {  // a mass that holds the motion well: Z - V would cancel
-      WARMSLIP_PETSC(VecSet(right, 0));
-      {
-        Values values(right);
-        for (std::size_t i = 0; i < springs_.size(); ++i)
-          if (springs_[i] >= begin && springs_[i] < end)
-            (*values)[springs_[i] - begin] += stiffness_[i] * at_springs_(static_cast<Eigen::Index>(i), j);
-      }
-      factor.solve(right, w);
-    }
-    inner_.push_back(std::move(v));
-    along_.push_back(std::move(w));
-  }
   for (Eigen::Index j = 0; j < count(); ++j) {
     WARMSLIP_PETSC(VecSet(right, 0));
     mass(motions_[static_cast<std::size_t>(j)], right);
     inertia_.row(j) = dots(along_, right).transpose();
+  }
+}
+
+// V and W of the operator that `solve` inverts.
+void RigidMotions::respond(const Solve& solve, const Apply& mass, std::vector<VecHandle>& inner,
+                           std::vector<VecHandle>& along) {
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(right_, &begin, &end));
+  for (Eigen::Index j = 0; j < count(); ++j) {
+    const Vec z = motions_[static_cast<std::size_t>(j)];
+    VecHandle v = duplicate(right_), w = duplicate(z);
+    WARMSLIP_PETSC(VecSet(right_, 0));
+    WARMSLIP_PETSC(VecSet(w, 0));
+    mass(z, w);
+    put_part(w, right_);
+    solve(right_, v);
+    take_part(v, w);
+    PetscReal size;
+    WARMSLIP_PETSC(VecNorm(w, NORM_INFINITY, &size));
+    WARMSLIP_PETSC(VecAYPX(w, -1, z));
+    share_ = std::max(share_, std::min(1.0, size));
+    if (size > 0.5) {  // a mass that holds the motion well: Z - V would cancel
+      WARMSLIP_PETSC(VecSet(right_, 0));
+      {
+        Values values(right_);
+        for (std::size_t i = 0; i < springs_.size(); ++i)
+          if (springs_[i] >= begin && springs_[i] < end)
+            (*values)[springs_[i] - begin] += stiffness_[i] * at_springs_(static_cast<Eigen::Index>(i), j);
+      }
+      const VecHandle whole = duplicate(right_);
+      solve(right_, whole);
+      take_part(whole, w);
+    }
+    inner.push_back(std::move(v));
+    along.push_back(std::move(w));
   }
 }
 
@@ -173,7 +202,9 @@ void RigidMotions::combine(const std::vector<VecHandle>& of, const Eigen::Vector
   WARMSLIP_PETSC(VecMAXPY(x, static_cast<PetscInt>(vectors.size()), by.data(), vectors.data()));
 }
 
-Eigen::VectorXd RigidMotions::load(Vec external, Vec all) const { return dots(motions_, external) - dots(inner_, all); }
+Eigen::VectorXd RigidMotions::load(Vec external, Vec all) const {
+  return dots(motions_, external) - dots(inner_transposed_.empty() ? inner_ : inner_transposed_, all);
+}
 
 Eigen::VectorXd RigidMotions::alone(const Eigen::VectorXd& load) const {
   const Eigen::FullPivLU<Eigen::MatrixXd> lu(inertia_);
@@ -182,11 +213,12 @@ Eigen::VectorXd RigidMotions::alone(const Eigen::VectorXd& load) const {
   return lu.solve(load);
 }
 
-void RigidMotions::add(const Eigen::VectorXd& motions, Vec inner, Vec x) const {
-  combine(inner_, -motions, inner);
-  WARMSLIP_PETSC(VecCopy(inner, x));
-  combine(motions_, motions, x);
+bool RigidMotions::holds() const {
+  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(inertia_).eigenvalues();
+  return values.minCoeff() >= -1e-12 * values.cwiseAbs().maxCoeff();
 }
+
+void RigidMotions::strain(const Eigen::VectorXd& motions, Vec inner) const { combine(inner_, -motions, inner); }
 
 Eigen::VectorXd RigidMotions::remove(Vec x) const {
   const Eigen::VectorXd motions = gram_.ldlt().solve(dots(motions_, x));
@@ -196,9 +228,9 @@ Eigen::VectorXd RigidMotions::remove(Vec x) const {
 
 void RigidMotions::carry(const Eigen::VectorXd& motions, Vec x) const { combine(motions_, motions, x); }
 
-template RigidMotions::RigidMotions(const Layout<2>&, int, const std::vector<std::string>&,
+template RigidMotions::RigidMotions(const Layout<2>&, int, int, const std::vector<std::string>&,
                                     const std::vector<std::string>&);
-template RigidMotions::RigidMotions(const Layout<3>&, int, const std::vector<std::string>&,
+template RigidMotions::RigidMotions(const Layout<3>&, int, int, const std::vector<std::string>&,
                                     const std::vector<std::string>&);
 
 }  // namespace warmslip

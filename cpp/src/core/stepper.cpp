@@ -41,17 +41,20 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   take(theta, now_.theta, "theta");
   now_.gap = gap;
   time_ = time;
+  scales_ = {};
   forget();
   if (now_.heating_w) multiply(operators_.heating, now_.straining(), now_.heating_w);
   products(now_);
 }
 
 template <int d>
-void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status) {
+void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status,
+                        const FieldScales& scales) {
   if (contact_force.size() != contact_force_.size() || status.size() != status_.size())
     throw std::invalid_argument("contact forces and statuses need one entry a contact point");
   contact_force_ = now_.contact_force = contact_force;
   status_ = status;
+  scales_ = scales;
   forget();
 }
 

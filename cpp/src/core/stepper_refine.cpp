@@ -60,9 +60,13 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     if (apply) again.iterations += contact.iterations;
     again.stage = std::max(again.stage, contact.stage);
   }
-  const Eigen::VectorXd motions = expand(change, monolithic ? coupled_ : correction_w_, correction_strained_);
+  const Eigen::VectorXd motions =
+      expand(change, rigid_.empty() ? correction_w_ : correction_strained_, correction_theta_);
+  if (!rigid_.empty()) {
+    WARMSLIP_PETSC(VecCopy(correction_strained_, correction_w_));
+    rigid_.carry(motions, correction_w_);
+  }
   if (monolithic) {
-    split(coupled_, correction_w_, correction_theta_);
     note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
          std::max(largest_entry(next_.theta), ledger.temperature_scale));
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));

@@ -41,6 +41,30 @@ Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Op
 }
 
 template <int d>
+std::vector<std::string> Stepper<d>::parts_in_contact(bool mechanical) const {
+  std::vector<std::string> names;
+  for (const ContactPart& contact : problem_.contacts)
+    if (contact.law || !mechanical) names.push_back(contact.part);
+  return names;
+}
+
+// Factors the operator of the motion, of `width` unknowns a node, with the rigid motions solved for apart.
+template <int d>
+void Stepper<d>::take_motion(Mat a, int width, Symmetry symmetry, const std::string& name) {
+  if (operators_.elasticity || operators_.viscosity)
+    rigid_ = RigidMotions(layout_, d, width, problem_.clamped, parts_in_contact(true));
+  if (!rigid_.empty()) rigid_.add_springs(a);
+  momentum_ = factor(a, surface_.unknowns(width), symmetry, width, name, options_.backend);
+  if (rigid_.empty()) return;
+  rigid_.prepare(*momentum_, [&](Vec x, Vec y) {
+    multiply(operators_.inertia, x, y);
+    WARMSLIP_PETSC(VecScale(y, 1 / options_.k));
+  });
+  if (symmetry == Symmetry::definite_or_refused && !rigid_.holds()) throw std::invalid_argument(indefinite_coupling);
+  books_.rigid_share(rigid_.share());
+}
+
+template <int d>
 void Stepper<d>::take_factors() {
   const double k = options_.k;
   const bool moves = problem_.moves(), conducts = problem_.conducts();
@@ -50,31 +74,18 @@ void Stepper<d>::take_factors() {
     auto [scale, symmetry] = coupled_symmetry(problem_);
     coupled_scale_ = scale;
     const MatHandle a = coupled_matrix(layout_, problem_, operators_, k, scale);
-    momentum_ = factor(a, surface_.unknowns(d + 1), symmetry, d + 1, "coupled", options_.backend);
+    take_motion(a, d + 1, symmetry, "coupled");
   } else {
-    std::vector<std::string> touching, exchanging;
-    for (const ContactPart& contact : problem_.contacts) {
-      if (contact.law) touching.push_back(contact.part);
-      exchanging.push_back(contact.part);
-    }
     if (moves) {
       const MatHandle a = momentum_matrix(layout_, problem_, operators_, k);
-      if (operators_.elasticity || operators_.viscosity) rigid_ = RigidMotions(layout_, d, problem_.clamped, touching);
-      if (!rigid_.empty()) rigid_.add_springs(a);
-      momentum_ = factor(a, surface_.unknowns(d), Symmetry::positive_definite, d, "momentum", options_.backend);
-      if (!rigid_.empty())
-        rigid_.prepare(*momentum_, [&](Vec x, Vec y) {
-          multiply(operators_.inertia, x, y);
-          WARMSLIP_PETSC(VecScale(y, 1 / k));
-        });
-      if (!rigid_.empty()) books_.rigid_share(rigid_.share());
+      take_motion(a, d, Symmetry::positive_definite, "momentum");
     }
     if (conducts) {
       const MatHandle h = heat_matrix(operators_, k);
       // a capacity and an exchange that hold the constant temperature beside the conduction need no help
       const double storing = largest_diagonal(operators_.mass) / k + largest_diagonal(operators_.exchange);
       if (storing < 0.1 * largest_diagonal(operators_.conductivity))
-        constants_ = RigidMotions(layout_, 1, problem_.cooled, exchanging);
+        constants_ = RigidMotions(layout_, 1, 1, problem_.cooled, parts_in_contact(false));
       if (!constants_.empty()) constants_.add_springs(h);
       const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
       heat_ = factor(h, apart, problem_.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,
@@ -92,10 +103,11 @@ void Stepper<d>::take_factors() {
   ContactOptions contact = options_.contact;
   // more contact points than nodes: sticking forces are shared in many ways, see ContactSolver::factor and share_least
   if (surface_.points() > surface_.nodes()) contact.proximal = 1e-6;
-  RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), rigid_.inertia()};
-  carried_ = apart.motions;
+  RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), {}, rigid_.inertia()};
+  apart.loads = carried_ = apart.motions;
   for (Eigen::Index j = 0; j < rigid_.count(); ++j) {
     apart.motions.col(j) = surface_.at_points(surface_.nodal_values(rigid_.along(j)));
+    apart.loads.col(j) = surface_.at_points(surface_.nodal_values(rigid_.along_transposed(j)));
     carried_.col(j) = surface_.at_points(surface_.nodal_values(rigid_.motion(j)));
   }
   contact_ = std::make_unique<ContactSolver<d>>(surface_.at_points(momentum_->compliance()), contact, std::move(apart));

@@ -114,16 +114,18 @@ void Stepper<d>::settle(const ContactSolution<d>& contact, Vec w, Vec moved) con
   if (moved) surface_.add(change, moved);
 }
 
-// The solution for the right-hand side of the last `reduce` and the forces of the contact, and what it has of the
-// rigid motions that are solved for apart; `strained` receives it but
-// for a rigid motion, where such are solved for apart.
+// The velocity and, monolithic, the temperature for the right-hand side of the last `reduce` and the forces of the
+// contact. Where rigid motions are solved for apart, `w` lacks them; they are returned.
 template <int d>
-Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec out, Vec strained) {
-  const bool apart = !rigid_.empty();
-  momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), apart ? strained : out);
-  if (!apart) return {};
-  const Eigen::VectorXd motions = contact_ ? contact.rigid : rigid_.alone(rigid_load_);
-  rigid_.add(motions, strained, out);
+Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec theta) {
+  const Vec out = monolithic() ? Vec(coupled_) : w;
+  momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), out);
+  Eigen::VectorXd motions;
+  if (!rigid_.empty()) {
+    motions = contact_ ? contact.rigid : rigid_.alone(rigid_load_);
+    rigid_.strain(motions, out);
+  }
+  if (monolithic()) split(coupled_, w, theta);
   return motions;
 }
 
@@ -167,13 +169,13 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     if (!solve_contact(contact_force_, contact)) return false;
   }
   const Timed part(cost_.momentum_seconds);
-  const Eigen::VectorXd motions = expand(contact, monolithic() ? coupled_ : next_.w, next_.strained_w);
-  if (!rigid_.empty()) {
-    next_.rigid = now_.rigid + motions;
-    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));  // anew: a body that comes to rest has its two motions cancel
+  if (rigid_.empty()) {
+    expand(contact, next_.w, next_.theta);
+  } else {
+    next_.rigid = now_.rigid + expand(contact, next_.strained_w, next_.theta);
+    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
     rigid_.carry(next_.rigid, next_.w);
   }
-  if (monolithic()) split(coupled_, next_.w, next_.theta);
   if (contact_) settle(contact, next_.w, next_.strained_w);
   return true;
 }
@@ -217,8 +219,9 @@ void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& give
   if (!reactive()) {
     heat_->expand(Eigen::VectorXd::Zero(free.size()), out);
     if (m > 0) {
-      WARMSLIP_PETSC(VecCopy(out, right));
-      constants_.add(constants_.alone(load), right, out);
+      const Eigen::VectorXd constants = constants_.alone(load);
+      constants_.strain(constants, out);
+      constants_.carry(constants, out);
     }
     return;
   }
@@ -239,8 +242,8 @@ void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& give
   const Eigen::VectorXd found = system.partialPivLu().solve(loads);
   heat_->expand(flow_ * found.head(n) - given, out);
   if (m > 0) {
-    WARMSLIP_PETSC(VecCopy(out, right));
-    constants_.add(found.tail(m), right, out);
+    constants_.strain(found.tail(m), out);
+    constants_.carry(found.tail(m), out);
   }
 }
 

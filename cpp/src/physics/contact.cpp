@@ -128,7 +128,7 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   PointResidual<d> out;
   out.touching = across.touching;
   out.pressed = lambda > 0;
-  out.apart = false;
+  out.apart = out.smooth = false;
   out.value = across.value * nu;
   out.by_force = across.by_force * normal;
   out.by_velocity = k * across.by_penetration * normal;
@@ -138,6 +138,7 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   const double size = trial.norm();
   if (bound <= 0 || (!out.touching && law.friction.cohesion <= 0 && !law.friction.custom)) {  // no friction
     out.status = out.touching ? Status::slip : Status::open;
+    out.smooth = true;
     out.apart = !out.touching && across.by_force == 1 && across.by_penetration == 0;
     out.value += tangential * force;
     out.by_force += tangential;

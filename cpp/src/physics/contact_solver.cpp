@@ -22,11 +22,12 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
   if (compliance_.rows() != compliance_.cols() || compliance_.rows() % d != 0)
     throw std::invalid_argument("the compliance must be square with d rows a contact point");
   if (rigid_.motions.size() == 0) rigid_.motions.resize(compliance_.rows(), rigid_.count());
+  if (rigid_.loads.size() == 0) rigid_.loads = rigid_.motions;
   spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
   give_ = spectral_ > 0 ? spectral_ : 1;
   carried_ = Eigen::MatrixXd::Zero(d, compliance_.rows());
   if (rigid_.count() == 0 || rigid_.inertia.isZero(0)) return;
-  const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.motions.transpose());
+  const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.loads.transpose());
   for (Eigen::Index row = 0; row < compliance_.rows(); row += d)
     carried_.middleCols<d>(row) = rigid_.motions.middleRows<d>(row) * velocities.middleCols<d>(row);
 }
@@ -69,6 +70,7 @@ void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisatio
   out.by_velocity.setZero();
   out.status = bound <= 0 && r <= 0 ? Status::open : speed > 0 ? Status::slip : Status::stick;
   out.apart = true;
+  out.smooth = false;
   at.value.template segment<d>(row) = out.value;
 }
 
@@ -84,7 +86,7 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
   at.value.head(force.size()) = force;
   if (rigid_.count() > 0) {
     at.velocity.noalias() += give_ * rigid_.motions * rigid;
-    at.value.tail(rigid_.count()) = rigid_.motions.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
+    at.value.tail(rigid_.count()) = rigid_.loads.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
   }
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
@@ -107,34 +109,33 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
   factored_.clear();                                      // until it is whole: memory may run out on the way
   closed_.clear();
-  for (std::size_t i = 0; i < at.points.size(); ++i)
-    if (!at.points[i].apart)
-      for (int c = 0; c < d; ++c) closed_.push_back(static_cast<Eigen::Index>(i) * d + c);
-  const auto n = static_cast<Eigen::Index>(closed_.size()), m = rigid_.count();
-  Eigen::MatrixXd tangent(n + m, n + m);
-  tangent.topLeftCorner(n, n) = -compliance_(closed_, closed_);
-  if (m > 0) {
-    const Eigen::MatrixXd motions = rigid_.motions(closed_, Eigen::all);
-    tangent.topRightCorner(n, m) = give_ * motions;
-    tangent.bottomLeftCorner(m, n) = motions.transpose();
-    tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
+  Eigen::Index n = 0;
+  for (std::size_t i = 0; i < at.points.size(); ++i) {
+    if (at.points[i].apart) continue;
+    using Basis = typename Closed::Basis;
+    closed_.push_back({static_cast<Eigen::Index>(i) * d, n,
+                       at.points[i].smooth ? Basis(problem.points[i].normal) : Basis(Tensor2<d>::Identity())});
+    n += closed_.back().size();
   }
-  for (Eigen::Index row = 0; row < n; row += d) {
-    const auto i = static_cast<std::size_t>(closed_[static_cast<std::size_t>(row)] / d);
-    tangent.template middleRows<d>(row) = (at.points[i].by_velocity * tangent.template middleRows<d>(row)).eval();
-    tangent.template block<d, d>(row, row) += at.points[i].by_force;
-    // Gauss points outnumber nodes: those that stick, or are pressed on a rigid foundation, share their force
-    // arbitrarily, and this picks the nearest share. The residual is untouched, so the answer is not regularised.
-    if (options_.proximal > 0) {
-      const Point<d>& nu = problem.points[i].normal;
-      const Tensor2<d> normal = nu * nu.transpose();
-      if (at.points[i].status == Status::stick)
-        tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - normal);
-      const double share = problem.law(i).compliance.rigid() ? options_.proximal : share_;
-      if (at.points[i].touching)
-        tangent.template block<d, d>(row, row) += std::max(0.0, share - nu.dot(at.points[i].by_force * nu)) * normal;
+  const Eigen::Index m = rigid_.count();
+  Eigen::MatrixXd tangent(n + m, n + m);
+  const auto at_block = [&](const Closed& row, const Closed& column) {
+    return tangent.block(row.at, column.at, row.size(), column.size());
+  };
+  for (const Closed& row : closed_) {
+    const PointResidual<d>& point = at.points[static_cast<std::size_t>(row.row / d)];
+    for (const Closed& column : closed_)
+      at_block(row, column) = -(row.basis.transpose() * point.by_velocity) *
+                              (compliance_.template block<d, d>(row.row, column.row) * column.basis);
+    at_block(row, row) += row.basis.transpose() * (point.by_force + shared(problem, point, row.row / d)) * row.basis;
+    for (Eigen::Index j = 0; j < m; ++j) {
+      const Point<d> motion = rigid_.motions.col(j).template segment<d>(row.row),
+                     load = rigid_.loads.col(j).template segment<d>(row.row);
+      tangent.col(n + j).segment(row.at, row.size()) = give_ * row.basis.transpose() * (point.by_velocity * motion);
+      tangent.row(n + j).segment(row.at, row.size()) = load.transpose() * row.basis;
     }
   }
+  tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
   // anew: Eigen's matrices lose their memory when they grow and cannot
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
@@ -148,30 +149,52 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   ++solution.factorizations;
 }
 
-// The Newton direction of forces and rigid motions: points apart take their force at once, the others share a dense
-// system.
+// Gauss points outnumber nodes: those that stick, or are pressed on a rigid foundation, share their force arbitrarily,
+// and this picks the nearest share. The residual is untouched, so the answer is not regularised.
+template <int d>
+Tensor2<d> ContactSolver<d>::shared(const ContactProblem<d>& problem, const PointResidual<d>& at,
+                                    Eigen::Index point) const {
+  const auto i = static_cast<std::size_t>(point);
+  const Point<d>& nu = problem.points[i].normal;
+  const Tensor2<d> normal = nu * nu.transpose();
+  Tensor2<d> out = Tensor2<d>::Zero();
+  if (options_.proximal <= 0) return out;
+  if (at.status == Status::stick) out += options_.proximal * (Tensor2<d>::Identity() - normal);
+  const double share = problem.law(i).compliance.rigid() ? options_.proximal : share_;
+  if (at.touching) out += std::max(0.0, share - nu.dot(at.by_force * nu)) * normal;
+  return out;
+}
+
+// The Newton direction of forces and rigid motions: points apart take their force at once, as does the tangential force
+// of one without friction; the others share a dense system. A body that nothing else holds would else slide by rounding
+// of a tangential force.
 template <int d>
 Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
-  const auto n = static_cast<Eigen::Index>(closed_.size()), m = rigid_.count(), all = compliance_.rows();
+  const Eigen::Index m = rigid_.count(), all = compliance_.rows(), n = tangent_.rows() - m;
   Eigen::VectorXd out = -at.value;
-  out(closed_).setZero();
+  for (const Closed& here : closed_) {
+    auto rest = out.template segment<d>(here.row);
+    if (here.size() == d)
+      rest.setZero();
+    else
+      rest -= here.basis * (here.basis.transpose() * rest).eval();
+  }
   out.tail(m).setZero();
-  Eigen::VectorXd right(n + m);
-  right << -at.value(closed_), -at.value.tail(m);
-  if (!out.isZero(0)) {
-    const Eigen::VectorXd change = compliance_ * out.head(all);  // of minus the velocities
-    for (Eigen::Index row = 0; row < n; row += d) {
-      const Eigen::Index component = closed_[static_cast<std::size_t>(row)];
-      right.template segment<d>(row) +=
-          at.points[static_cast<std::size_t>(component / d)].by_velocity * change.template segment<d>(component);
-    }
-    if (m > 0) right.tail(m) -= rigid_.motions.transpose() * out.head(all);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(n + m);
+  const bool any = !out.isZero(0);
+  const Eigen::VectorXd change = any ? compliance_ * out.head(all) : Eigen::VectorXd();  // of minus the velocities
+  for (const Closed& here : closed_) {
+    const PointResidual<d>& point = at.points[static_cast<std::size_t>(here.row / d)];
+    Point<d> rest = -at.value.template segment<d>(here.row);
+    if (any) rest += point.by_velocity * change.template segment<d>(here.row);
+    right.segment(here.at, here.size()) = here.basis.transpose() * rest;
   }
-  if (n + m > 0) {
-    right = tangent_.solve(right);
-    out(closed_) = right.head(n);
-    out.tail(m) = right.tail(m);
-  }
+  right.tail(m) = -at.value.tail(m);
+  if (any && m > 0) right.tail(m) -= rigid_.loads.transpose() * out.head(all);
+  if (n + m > 0) right = tangent_.solve(right);
+  for (const Closed& here : closed_)
+    out.template segment<d>(here.row) += here.basis * right.segment(here.at, here.size());
+  out.tail(m) = right.tail(m);
   return out;
 }
 
@@ -302,7 +325,7 @@ void ContactSolver<d>::glue(const ContactProblem<d>& problem, ContactSolution<d>
   Eigen::VectorXd right(n + m);
   system.topLeftCorner(n, n) = -compliance_(rows, rows);
   system.topRightCorner(n, m) = give_ * rigid_.motions(rows, Eigen::all);
-  system.bottomLeftCorner(m, n) = rigid_.motions(rows, Eigen::all).transpose();
+  system.bottomLeftCorner(m, n) = rigid_.loads(rows, Eigen::all).transpose();
   right << -problem.free(rows), problem.rigid;
   for (Eigen::Index row = 0; row < n; row += d) {
     const auto i = static_cast<std::size_t>(rows[static_cast<std::size_t>(row)] / d);
@@ -351,7 +374,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     solution.rigid.setZero();
     if (massive)
       solution.rigid =
-          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.motions.transpose() * solution.added);
+          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.loads.transpose() * solution.added);
   };
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
