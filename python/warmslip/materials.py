@@ -88,7 +88,7 @@ def make_mesh(scene: Scene) -> Any:
         return mesh
     nodes = np.array(mesh.nodes)
     for axis, (ratio, length) in enumerate(zip(table.grading, table.sides, strict=True)):
-        if ratio != 1:  # a geometric row of bricks; halving them keeps meshes nested
+        if ratio != 1:  # a geometric row of bricks, of which twice as many have all its nodes
             with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
                 nodes[:, axis] = length * np.expm1(np.log(ratio) * nodes[:, axis] / length) / (ratio - 1)
     return kind.from_lists(nodes, mesh.cells, {name: np.array(facets) for name, facets in mesh.parts.items()})

@@ -160,6 +160,15 @@ def several(
     ]
 
 
+def shares(coefficient: float) -> list[str]:
+    """Of the largest friction coefficient, where points with friction share their normal forces."""
+    return [
+        f"the friction coefficient is {coefficient:g} where contact points share their normal forces in many ways, as more "
+        "points than nodes do on a rigid foundation and two parts at a corner: a step may have several solutions, of which "
+        "Newton's method takes the one it reaches from the forces of the step before; take a finite contact.stiffness there"
+    ]
+
+
 def down(value: float) -> str:
     """Two digits of a positive number, rounded down."""
     if not 0 < value < math.inf:

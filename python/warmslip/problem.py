@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import _core
+from warmslip.clamped import Clamped
 from warmslip.expressions import told
 from warmslip.laws import Law, Watched
 from warmslip.load_vectors import LoadVectors
@@ -34,6 +35,7 @@ class Discretisation:
     norms: Any
     load_vectors: LoadVectors
     laws: list[Watched]  # functions in the place of the scene's laws
+    clamped: Clamped  # contact points that supports hold
     own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
 
     @property
@@ -198,7 +200,8 @@ def discretise(
     """Assembles a scene on a communicator (default: all ranks).
 
     `loads` replaces the scene's, `mesh` its mesh, and `laws` the contact laws of the parts it names. Collective. Raises
-    TypeError for what is no scene, loads or laws, ValueError when the contact part has no free node or a law is none.
+    TypeError for what is no scene, loads or laws, ValueError when the contact part has no free node, a law is none, or a support
+    that stays where it is holds a part inside a rigid foundation.
     """
     from mpi4py import MPI
 
@@ -230,6 +233,10 @@ def discretise(
             )
     operators = of_dim("Operators", d)(layout, problem)
     vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
+    rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in own)
+    clamped = Clamped(scene, mesh, surface, loads, vectors, rigid)
+    if not clamped.of_time and (why := clamped.inside(0.0)):
+        raise ValueError(f"supports.displacement: {why}")
     return Discretisation(
         scene,
         loads,
@@ -241,6 +248,7 @@ def discretise(
         of_dim("Norms", d)(layout),
         vectors,
         list(watched.values()),
+        clamped,
         own,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -122,11 +123,16 @@ class Run:
 
         Ends before a step that is not right, whose state is not kept: see `outcome` and `failure`. Collective.
         """
+        moving = self.discretisation.clamped.of_time
         for n in range(self.taken + 1, self.scene.time.steps + 1):
             try:
                 loads = self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step)
             except ValueError as error:  # a formula that gives no finite number; on every rank
                 self.outcome, self.failure = "data_not_finite", {"step": n, "reason": str(error)}
+                return
+            if moving and (why := self.discretisation.clamped.inside(n * self.scene.step)):
+                self.outcome, self.failure = "held_inside", {"step": n, "reason": why}
+                log.info("step %d was not taken: %s", n, self.outcome)
                 return
             for law in self.discretisation.laws:
                 for function in law.functions:
@@ -189,8 +195,9 @@ def run(
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
-    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), law_failed (a law of one's own), identity_violated,
-    precision_lost, unsupported, solver_failed (`failure` in the summary has the step that was not taken), and interrupted after
+    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), held_inside (a support in a rigid foundation),
+    law_failed (a law of one's own), identity_violated, precision_lost, unsupported, solver_failed (`failure` in the summary
+    has the step that was not taken), and interrupted after
     Ctrl-C or SIGTERM, which leave a checkpoint.
     Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
     cannot be written.
@@ -237,16 +244,17 @@ def run(
             if asked and not last:
                 job.outcome = "interrupted"
                 break
+    result = finish(job, folder)
     if folder is not None and rank == 0 and job.outcome != "interrupted":
-        for name in checkpoint.NAMES:  # the run is over
+        for name in checkpoint.NAMES:  # the run is over, and all of it is on the disk
             (folder / name).unlink(missing_ok=True)
-    return finish(job, folder)
+    return result
 
 
 def _ended(job: Run, folder: Path) -> Result | None:
     """The result in a folder where this very run has ended right before (collective). Functions in Python are not told apart."""
     found: Result | None = None
-    if job.comm.rank == 0 and not job.discretisation.own:
+    if job.comm.rank == 0 and not job.discretisation.own and (folder / "final.vtu").exists():  # else the disk was full
         try:
             told = json.loads((folder / "summary.json").read_text())
             stamp = told["stamp"]
@@ -261,6 +269,17 @@ def _ended(job: Run, folder: Path) -> Result | None:
     return job.comm.bcast(found, root=0)  # type: ignore[no-any-return]
 
 
+def _whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Writes a file beside its place and renames it, so that there is all of it or none."""
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        write(part)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path.parent)) from None
+
+
 def _clear(folder: Path, *more: str) -> None:
     """Removes what would speak of another run."""
     for name in ("summary.json", "final.vtu", *more):
@@ -272,6 +291,6 @@ def finish(job: Run, folder: Path | None) -> Result:
     told = job.summary()
     u, w, theta = (job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta"))
     if folder is not None and job.comm.rank == 0:
-        (folder / "summary.json").write_text(json.dumps(told, indent=2) + "\n")
-        mesh_io.write_vtu(folder / "final.vtu", job.discretisation, u, w, theta)
+        _whole(folder / "summary.json", lambda path: path.write_text(json.dumps(told, indent=2) + "\n"))
+        _whole(folder / "final.vtu", lambda path: mesh_io.write_vtu(path, job.discretisation, u, w, theta))
     return Result(told, u, w, theta, folder / "trajectory.h5" if folder is not None else None)

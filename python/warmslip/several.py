@@ -12,7 +12,7 @@ from warmslip import plausibility as say
 from warmslip.loads import Array
 from warmslip.problem import Discretisation
 from warmslip.tables import ContactTable
-from warmslip.uniqueness import POINTS, ContactPoints, bound, exact
+from warmslip.uniqueness import POINTS, ContactPoints, bound, exact, shares_friction
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,15 @@ class Finding:
         Whether some load has several solutions, or none, beyond it.
     reason
         Why nothing is known, "" otherwise; `factor` is 0 then.
+    shares
+        Whether that is because a share of the forces changes a friction bound.
     """
 
     coefficients: tuple[float, ...]
     factor: float
     sharp: bool = False
     reason: str = ""
+    shares: bool = False
 
     @property
     def most(self) -> float:
@@ -70,6 +73,7 @@ def condensed(d: Discretisation, stepper: Any) -> ContactPoints:
         step=d.scene.step,
         stiffness=np.array(rises)[part],
         friction=np.array([_coefficient(c) for c in contacts])[part],
+        rubs=np.array([c.friction is not None or f"laws.{c.part}.friction" in d.own for c in contacts])[part],
     )
 
 
@@ -123,17 +127,11 @@ def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touch
         c.friction is None or not (c.friction.limit or c.friction.regularisation or c.friction.cohesion)
         for c in contacts
     )
-    if d.dim == 2 and straight and simple and len(points.weights) <= POINTS and _definite(points):
+    if shares_friction(points):
+        return Finding(coefficients, 0.0, reason="its contact points share their forces in many ways", shares=True)
+    if d.dim == 2 and straight and simple and len(points.weights) <= POINTS:
         return Finding(coefficients, exact(points), sharp=True)
-    factor = bound(points, enough=enough)
-    if factor == 0:
-        return Finding(coefficients, 0.0, reason="its contact points share their forces in many ways")
-    return Finding(coefficients, factor)
-
-
-def _definite(points: ContactPoints) -> bool:
-    a = points.operator
-    return bool(len(a) == 0 or np.linalg.matrix_rank(a) == len(a))
+    return Finding(coefficients, bound(points, enough=enough))
 
 
 def line(found: Finding) -> str:
@@ -155,6 +153,8 @@ def line(found: Finding) -> str:
 def sentences(d: Discretisation, stepper: Any, stages: dict[str, int]) -> list[str]:
     """What a run says at its end where its friction is beyond the bound; `stages` counts its steps by how they were solved."""
     found = of_scene(d, stepper, enough=1.0)
+    if found.shares:
+        return say.shares(max(found.coefficients))
     if not found.several:
         return []
     touching = np.asarray(stepper.status) > 0

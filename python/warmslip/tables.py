@@ -51,7 +51,8 @@ class Table(BaseModel):
 class MeshTable(Table):
     """A structured box, `n` bricks a side (or one number an axis), each cut along `diagonal`; or a gmsh `file`.
 
-    `grading` is the size of the last brick over that of the first, one number an axis.
+    `grading` is the size of bricks at the far end of an axis over that at the near one, one number an axis: bricks grow in
+    geometric progression, and the last of n is grading^((n - 1)/n) times the first.
     """
 
     shape: Literal["square", "cube"] | None = None
@@ -61,7 +62,8 @@ class MeshTable(Table):
     lengths: list[Positive] | None = None
     """Sides, length; 1 along every axis unless given."""
     grading: list[Positive] | None = None
-    """Size of the last brick over that of the first, one number an axis; 1 unless given."""
+    """Size of bricks at the far end of an axis over that at the near one, which twice the bricks keep; the last of n bricks is
+    grading^((n - 1)/n) times the first. One number an axis; 1 unless given."""
     diagonal: Literal["right", "left", "crisscross"] = "right"
     """How a brick is cut: from (0,0) to (1,1), the other way, or both (square only)."""
     file: str | None = None

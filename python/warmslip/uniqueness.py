@@ -16,12 +16,20 @@ In the plane the step is a piecewise linear map with four pieces a point, and at
 two. Such a map is one to one for all loads if, and only if, the determinants of its pieces have one sign (Kuhn & Loewen, Linear
 Algebra Appl. 96, 1987; Scholtes, Introduction to Piecewise Differentiable Equations, 2012). They change it first where a set of
 slipping points has det(A_nn + sum of +-mu_i columns of A_ntau) = 0, with points that stick eliminated: an eigenvalue problem.
+
+Where points outnumber nodes, or two parts meet, A is singular: some forces move nothing (`shared`). One solution then means one
+velocity, whatever the shares. As long as no normal force with friction is among the shares, the foundation's answer to a velocity
+is a convex set of nodal forces, the degree of the step is 1 for all mu, and determinants of one sign, shares aside, mean one
+velocity again; (2) holds on what the shares leave, with p = q = 1 for their normal forces. Otherwise a share changes a friction
+bound, and nothing is proved.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,6 +41,7 @@ from warmslip.loads import Array
 
 POINTS = 8  # of which all statuses are looked at: 4^8 = 65,536
 ROUNDING, DISTINCT = 1e-12, 1e-9  # relative: of the law, and between two solutions
+NOTHING = 1e-10  # relative: what forces move that move nothing
 SMALL, DENSE = (
     100,
     600,
@@ -64,6 +73,8 @@ class ContactPoints:
         c_nu, pressure per penetration: the steepest rise of the law; infinite on a rigid foundation.
     friction : (points,)
         mu, dimensionless. A constant bound (Tresca) is 0 here, as it leaves one solution.
+    rubs : (points,)
+        Whether there is a tangential force, as a constant bound has one too; where mu > 0 unless given.
     """
 
     compliance: Array
@@ -72,6 +83,7 @@ class ContactPoints:
     step: float
     stiffness: Array
     friction: Array
+    rubs: Array | None = None
 
     def of(self, points: Array) -> ContactPoints:
         """Some of the points, by index or mask (points,); the others bear no force."""
@@ -85,13 +97,20 @@ class ContactPoints:
             weights=self.weights[kept],
             stiffness=self.stiffness[kept],
             friction=self.friction[kept],
+            rubs=None if self.rubs is None else self.rubs[kept],
         )
 
     @property
     def rubbing(self) -> ContactPoints:
         """The points that a force moves and the foundation presses: the others have no part in the question."""
         own = np.diag(self.compliance).reshape(self.normals.shape).sum(axis=1)
-        return self.of((own > 0) & (self.stiffness > 0))
+        rubs = (own > 0) & (self.stiffness > 0)
+        return self if rubs.all() else self.of(rubs)
+
+    @cached_property
+    def balanced(self) -> _Balanced:
+        """A by what its forces move."""
+        return _Balanced.of(self)
 
     @property
     def frames(self) -> Array:
@@ -116,6 +135,45 @@ class ContactPoints:
         a = turned[np.ix_(order, order)]
         a[range(n), range(n)] += 1 / (self.weights * self.stiffness * self.step)
         return np.asarray(a)
+
+
+@dataclass(frozen=True)
+class _Balanced:
+    """A with ones on its diagonal, its rows and columns those of the forces that are there; `scale` makes it of A.
+
+    `there` are the places of these forces in A, `moved` and `shares`, (forces, many), span the forces that move something and
+    those that move nothing.
+    """
+
+    matrix: Array
+    scale: Array
+    there: Any
+    moved: Array
+    shares: Array
+
+    @classmethod
+    def of(cls, points: ContactPoints) -> _Balanced:
+        a, (n, d) = points.operator, points.normals.shape
+        rubs = points.friction > 0 if points.rubs is None else points.rubs
+        there = np.flatnonzero(np.concatenate([np.ones(n, dtype=bool), np.repeat(rubs, d - 1)]))
+        scale = 1 / np.sqrt(np.maximum(np.diag(a)[there], np.finfo(float).tiny))
+        matrix = scale[:, None] * a[np.ix_(there, there)] * scale
+        values, vectors = eigh(matrix)
+        moves = values > NOTHING * values.max(initial=0.0)
+        return cls(matrix, scale, there, vectors[:, moves], vectors[:, ~moves])
+
+    def shared(self, count: int) -> Any:
+        """The points, of `count`, whose normal forces are among the shares, as a mask (points,)."""
+        return np.linalg.norm(self.shares[:count], axis=1) > np.sqrt(NOTHING)
+
+
+def shares_friction(points: ContactPoints) -> bool:
+    """Whether points with friction share their normal forces in many ways, so that no mu is known to leave one solution.
+
+    On a rigid foundation more Gauss points than nodes do, and the two parts that meet in a corner.
+    """
+    points = points.rubbing
+    return bool(np.any(points.balanced.shared(len(points.weights))[points.friction > 0]))
 
 
 def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
@@ -145,6 +203,8 @@ def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
     points = points.rubbing
     if not np.any(points.friction > 0):
         return np.inf
+    if shares_friction(points):
+        return 0.0
     n, form, best, start = len(points.weights), _Form(points), 0.0, COARSE[0]
     for pair in COARSE:
         found = form.value(*np.full((3, n), np.array([[pair[0]], [1.0], [pair[1]]])))
@@ -179,26 +239,22 @@ class _Form:
     """The two sides of (2) for all weights."""
 
     def __init__(self, points: ContactPoints) -> None:
-        a, n, mu = points.operator, len(points.weights), points.friction
-        self._n, self._across, self._free = n, points.normals.shape[1] - 1, True
-        tangential = (a[n:, n:] + a[n:, n:].T) / 2
-        values, vectors = eigh(tangential)
-        base, felt = np.eye(len(a)), values > 1e-12 * values[-1]
-        # forces of Gauss points that move nothing: both sides of (2) vanish there where all q are the same
-        if not felt.all():
-            self._free = False
-            seen = vectors[:, felt]
-            base = np.block([[np.eye(n), np.zeros((n, seen.shape[1]))], [np.zeros((len(seen), n)), seen]])
-        self._mu, self._own = mu, np.diag(tangential).reshape(n, -1).sum(axis=1)
+        a, n, mu, balanced = points.operator, len(points.weights), points.friction, points.balanced
+        self._n, self._across = n, points.normals.shape[1] - 1
+        # both sides of (2) vanish on forces that move nothing, where all weights of these are the same
+        self._free, self._apart = balanced.shares.shape[1] == 0, ~balanced.shared(n)
+        base = np.zeros((len(a), balanced.moved.shape[1]))
+        base[balanced.there] = np.diag(balanced.scale) if self._free else balanced.scale[:, None] * balanced.moved
+        self._mu, self._own = mu, np.diag(a)[n:].reshape(n, -1).sum(axis=1)
         self._a, self._base, self._moved = a @ base, base, a[n:] @ base
         self.size = base.shape[1]
 
     def _sides(self, p: Array, q: Array, t: Array) -> tuple[Array, Array]:
         n, mu = self._n, q * self._mu
-        weights = np.concatenate([p, np.repeat(q, self._across)])
+        weights = np.concatenate([np.where(self._apart, p, q), np.repeat(q, self._across)])
         left = self._base.T @ (weights[:, None] * self._a)
         right = self._moved.T @ (np.repeat(mu / (t * self._own), self._across)[:, None] * self._moved)
-        right[range(n), range(n)] += mu * t * self._own
+        right += self._base[:n].T @ ((mu * t * self._own)[:, None] * self._base[:n])
         return (left + left.T) / 2, right / 2
 
     def at(self, p: Array, q: Array, t: Array) -> tuple[float, float, Array]:
@@ -213,12 +269,12 @@ class _Form:
         shares = (values / values[-1]) ** SHARP
         value = np.log(values[-1]) + np.log(shares.sum()) / SHARP
         moved, reach = self._moved @ vectors, (t * self._own)[:, None]
-        pressing = reach * vectors[:n] ** 2
+        forces = self._base @ vectors
+        pressing = reach * forces[:n] ** 2
         along = (moved**2).reshape(n, self._across, -1).sum(axis=1) / reach
-        forces = (self._base @ vectors)[n:]
-        work = (forces * moved).reshape(n, self._across, -1).sum(axis=1)
+        work = (forces[n:] * moved).reshape(n, self._across, -1).sum(axis=1)
         mu = (q * self._mu / 2)[:, None]
-        by_p = -p[:, None] * vectors[:n] * (self._a[:n] @ vectors)
+        by_p = -(self._apart * p)[:, None] * forces[:n] * (self._a[:n] @ vectors)
         by_q = mu * (pressing + along) / values - q[:, None] * work
         by_t = mu * (pressing - along) / values
         slope = np.concatenate([by_p, self._free * by_q, by_t]) @ (shares / shares.sum())
@@ -250,12 +306,13 @@ def _largest(right: Array, factor: Array) -> float:
 def exact(points: ContactPoints) -> float:
     """The number by which all coefficients may be multiplied until some load has several solutions, or none, in the plane.
 
-    Below it every load has one solution. Looks at all statuses: at most `POINTS` points, seconds for 8.
+    Below it every load has one solution, of which the velocities count where points share their forces. Looks at all statuses:
+    at most `POINTS` points, seconds for 8.
 
     Parameters
     ----------
     points
-        Compliance, law and step; the law piecewise linear with Coulomb's friction, d = 2, C positive definite.
+        Compliance, law and step; the law piecewise linear with Coulomb's friction or none, d = 2.
 
     Returns
     -------
@@ -265,21 +322,29 @@ def exact(points: ContactPoints) -> float:
     Raises
     ------
     ValueError
-        In space, or for more points.
+        In space, for more points, or where `shares_friction`.
     """
     points = points.rubbing
     _refuse(points)
-    a, n, mu = points.operator, len(points.weights), points.friction
+    if shares_friction(points):
+        raise ValueError("points with friction share their normal forces in many ways; give one law or fewer points")
+    step = _Pieces(points)
+    rough, smooth = np.flatnonzero(points.friction > 0).tolist(), np.flatnonzero(points.friction == 0).tolist()
     most = 0.0
-    for size in range(1, n + 1):
+    for size in range(1, len(rough) + 1):
         rest = list(itertools.product((1.0, -1.0), repeat=size - 1))
         signs = np.hstack([np.ones((len(rest), 1)), np.array(rest).reshape(len(rest), size - 1)])
-        for slips in itertools.combinations(range(n), size):
-            others = [i for i in range(n) if i not in slips and mu[i] > 0]
-            for count in range(len(others) + 1):
-                for sticks in itertools.combinations(others, count):
-                    most = max(most, _first_change(a, n, mu, list(slips), list(sticks), signs))
-    return 1 / most if most > 0 else np.inf
+        for slips in itertools.combinations(rough, size):
+            others = [i for i in rough if i not in slips]
+            for sticks in _subsets(others):
+                for pressed in _subsets(smooth):
+                    most = max(most, step.first_change(list(slips), sticks, pressed, signs))
+    return 1 / most if most > NOTHING else np.inf
+
+
+def _subsets(of: list[int]) -> Iterator[list[int]]:
+    for count in range(len(of) + 1):
+        yield from map(list, itertools.combinations(of, count))
 
 
 def _refuse(points: ContactPoints) -> None:
@@ -287,18 +352,36 @@ def _refuse(points: ContactPoints) -> None:
         raise ValueError(f"all statuses are looked at for at most {POINTS} points in the plane; give fewer")
 
 
-def _first_change(a: Array, n: int, mu: Array, slips: list[int], sticks: list[int], signs: Array) -> float:
-    """The reciprocal of the least factor of mu at which a determinant of these slipping and sticking points vanishes."""
-    stuck, along = sticks + [n + i for i in sticks], [n + i for i in slips]
-    free = slips + along
-    rows = a[np.ix_(slips, free)]
-    if stuck:
-        rows = rows - a[np.ix_(slips, stuck)] @ np.linalg.solve(a[np.ix_(stuck, stuck)], a[np.ix_(stuck, free)])
-    size = len(slips)
-    pull = np.linalg.solve(rows[:, :size], rows[:, size:]) * mu[slips]
-    values = np.linalg.eigvals(pull * signs[:, None, :])
-    real = np.abs(values.imag) <= 1e-9 * np.abs(values).max()
-    return float(np.abs(values.real[real]).max(initial=0.0))
+class _Pieces:
+    """The pieces of a step in the plane: every point is open, sticks or slips one way, or without friction is pressed."""
+
+    def __init__(self, points: ContactPoints) -> None:
+        balanced, n, mu = replace(points, rubs=None).balanced, len(points.weights), points.friction
+        self._a, self._singular = balanced.matrix, balanced.shares.shape[1] > 0
+        along = np.flatnonzero(mu > 0)
+        self._along = np.zeros(n, dtype=int)
+        self._along[along] = n + np.arange(len(along))
+        self._mu = np.zeros(n)
+        self._mu[along] = mu[along] * balanced.scale[along] / balanced.scale[n:]
+
+    def first_change(self, slips: list[int], sticks: list[int], pressed: list[int], signs: Array) -> float:
+        """The reciprocal of the least factor of mu at which a determinant of these statuses vanishes."""
+        a, along = self._a, self._along
+        held, free = pressed + sticks + along[sticks].tolist(), slips + along[slips].tolist()
+        rows = a[np.ix_(slips, free)]
+        if held:
+            rows = rows - a[np.ix_(slips, held)] @ self._solve(a[np.ix_(held, held)], a[np.ix_(held, free)])
+        size = len(slips)
+        pull = np.linalg.solve(rows[:, :size], rows[:, size:]) * self._mu[slips]
+        values = np.linalg.eigvals(pull * signs[:, None, :])
+        real = np.abs(values.imag) <= 1e-9 * np.abs(values).max()
+        return float(np.abs(values.real[real]).max(initial=0.0))
+
+    def _solve(self, matrix: Array, right: Array) -> Array:
+        """Any of the shares will do, as all move the body alike."""
+        if self._singular:
+            return np.asarray(np.linalg.pinv(matrix, rcond=NOTHING, hermitian=True) @ right)
+        return np.linalg.solve(matrix, right)
 
 
 @dataclass(frozen=True)
@@ -313,8 +396,9 @@ class Solution:
 def solutions(points: ContactPoints, free: Array, penetration: Array) -> list[Solution]:
     """All solutions of one step in the plane: every status of every point is solved and held against the law.
 
-    At most `POINTS` points with a linear pressure and Coulomb's friction. A load at which solutions branch may have a whole line
-    of them, of which the ends are found. Costs 4^points small systems, seconds for 8 points.
+    At most `POINTS` points with a linear pressure and Coulomb's friction that share no forces. A load at which
+    solutions branch may have a whole line of them, of which the ends are found. Costs 4^points small systems,
+    seconds for 8 points.
 
     Parameters
     ----------
@@ -333,9 +417,11 @@ def solutions(points: ContactPoints, free: Array, penetration: Array) -> list[So
     Raises
     ------
     ValueError
-        In space, or for more points.
+        In space, for more points, or where forces move nothing and every share of them is a solution.
     """
     _refuse(points)
+    if points.rubbing.balanced.shares.shape[1] > 0:
+        raise ValueError("the points share their forces in many ways; take contact.quadrature = 'nodal' and one part")
     n, frames, a = len(points.weights), points.frames, points.operator
     drive = np.einsum("iam,ia->mi", frames, np.asarray(free, dtype=float)).ravel()
     drive[:n] += np.asarray(penetration, dtype=float) / points.step

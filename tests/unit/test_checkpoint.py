@@ -403,6 +403,30 @@ def test_a_full_disk_ends_in_a_sentence_and_can_be_gone_on_from(
     same(tmp_path / "whole", tmp_path / "run")
 
 
+@pytest.mark.parametrize("every", [5, 100], ids=["checkpoints", "too short for one"])
+def test_a_disk_that_is_full_at_the_end_loses_nothing(tmp_path: Path, monkeypatch: Any, every: int) -> None:
+    one = scene(f"output.checkpoint={every}")
+    whole = warmslip.run(one, out=tmp_path / "whole")
+
+    def full(path: Path, *fields: Any) -> None:
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(warmslip.mesh_io, "write_vtu", full)
+    with pytest.raises(OSError, match="No space left") as raised:
+        warmslip.run(one, out=tmp_path / "run")
+    assert raised.value.filename == str(tmp_path / "run")  # what the command names in its sentence
+    left = {path.name for path in (tmp_path / "run").iterdir()}
+    assert left == {"trajectory.h5", "summary.json", *(checkpoint.NAMES if every == 5 else ())}
+    same(tmp_path / "whole", tmp_path / "run")
+    monkeypatch.undo()
+    again = warmslip.run(one, out=tmp_path / "run", resume=True)
+    assert again.right and np.array_equal(again.u, whole.u)
+    left = {path.name for path in (tmp_path / "run").iterdir()}
+    assert left == {"trajectory.h5", "summary.json", "final.vtu"}
+    assert (tmp_path / "run" / "final.vtu").read_bytes() == (tmp_path / "whole" / "final.vtu").read_bytes()
+
+
 def test_a_checkpoint_that_cannot_be_written_leaves_those_before(tmp_path: Path, monkeypatch: Any) -> None:
     with pytest.raises(KilledError):
         warmslip.run(scene(), out=tmp_path, progress=stop_after(7))

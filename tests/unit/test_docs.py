@@ -25,7 +25,7 @@ from warmslip import _core, cli, interruption
 DOCS = Path(__file__).parents[2] / "python" / "docs"
 PAGES = [page for page in sorted(DOCS.rglob("*.md")) if "```" in page.read_text()]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-STOPPED = ("data_not_finite:", *(f"{name}:" for name in _core.Outcome.__members__ if name != "right"))
+STOPPED = ("data_not_finite:", "held_inside:", *(f"{name}:" for name in _core.Outcome.__members__ if name != "right"))
 OWN_PROCESS = ("--petsc", "--log", "|", ">")
 
 
@@ -111,7 +111,7 @@ def test_every_term_of_the_ledger_is_explained() -> None:
 
 def test_every_outcome_is_explained() -> None:
     text = (DOCS / "messages.md").read_text()
-    for name in (*_core.Outcome.__members__, "data_not_finite", "law_failed", "interrupted"):
+    for name in (*_core.Outcome.__members__, "data_not_finite", "held_inside", "law_failed", "interrupted"):
         assert f"`{name}`" in text, name
 
 

@@ -163,3 +163,18 @@ def test_meshes_of_scenes(small: MakeScene) -> None:
     assert len(mesh.cells) == 12
     assert np.asarray(mesh.nodes).max(axis=0).tolist() == [2, 1]
     assert Loads.of(small()).foundation_temperature == 0
+
+
+@pytest.mark.parametrize(("n", "ratio"), [(3, 8.0), (4, 0.25)])
+def test_graded_bricks_grow_as_the_key_says(small: MakeScene, n: int, ratio: float) -> None:
+    """A geometric progression, added up: its last brick is ratio^((n-1)/n) times the first; twice as many keep its nodes."""
+
+    def places(bricks: int) -> Any:
+        mesh = make_mesh(small(mesh__n=[bricks, 1], mesh__lengths=[2.0, 1.0], mesh__grading=[ratio, 1.0]))
+        return np.unique(np.asarray(mesh.nodes)[:, 0].round(13))
+
+    row = ratio ** (np.arange(n) / n)
+    sizes = np.diff(places(n))
+    assert np.abs(sizes - 2 * row / row.sum()).max() <= 1e-12
+    assert sizes[-1] / sizes[0] == pytest.approx(ratio ** ((n - 1) / n), rel=1e-10)
+    assert np.abs(places(2 * n)[::2] - places(n)).max() <= 1e-12

@@ -250,9 +250,9 @@ def quasistatic_on_contact(d: int) -> None:
     job = right(one)
     assert job.report.normal_force == pytest.approx(1.0, rel=1e-12)
     assert np.linalg.norm(job.report.friction_traction) == pytest.approx(0.1, rel=1e-12)
-    for loads, said in (({"body": along(d, 1.0)}, "unsupported"), ({"body": along(d, -1.0, 0.6)}, "unsupported")):
-        lifted = Run(one.override(loads=loads))
-        assert not list(lifted.steps()) and lifted.outcome in (said, "contact_not_converged"), lifted.outcome
+    for body in (along(d, 1.0), along(d, -1.0, 0.6)):
+        lifted = Run(one.override(loads={"body": body}))
+        assert not list(lifted.steps()) and lifted.outcome == "unsupported", lifted.outcome
 
 
 @check

@@ -105,6 +105,8 @@ class ContactSolver {
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  void glue(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
+  bool approach(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
   OwnCompliance own(const ContactProblem<d>& problem, std::size_t point) const;
 
@@ -114,6 +116,7 @@ class ContactSolver {
   double boldness_ = 1;         // of the tangential rows, against the reciprocal of the point's own compliance
   Eigen::MatrixXd carried_;     // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
   double share_ = 0;            // > 0: pressed points share their force on a stiff foundation as on a rigid one
+  double leash_ = 0;            // > 0: force per velocity that holds a body without mass while nothing else does
   bool carries_ = false;        // whether a point's own compliance includes the rigid motions
   double give_ = 1;             // velocity per force, the unit of the rigid motions
   double spectral_ = 0;         // largest row sum of |compliance|, a bound on its eigenvalues

@@ -8,6 +8,12 @@ namespace {
 
 constexpr int few_steps = 15;  // before other scales are tried
 
+// Eigen's estimate alone is any number where a pivot is 0 exactly.
+bool singular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
+  const auto pivots = lu.matrixLU().diagonal().cwiseAbs();
+  return !(pivots.minCoeff() > 1e-14 * pivots.maxCoeff() && lu.rcond() > 1e-14);
+}
+
 }  // namespace
 
 template <int d>
@@ -134,7 +140,11 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
-  solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && !(tangent_.rcond() > 1e-14);
+  solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
+  if (solution.unsupported && leash_ > 0) {  // the load then moves the body until something holds it
+    tangent.bottomRightCorner(m, m).diagonal().array() += give_ * leash_;
+    tangent_.compute(tangent);
+  }
   factored_ = at.key;
   ++solution.factorizations;
 }
@@ -223,7 +233,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     if (step >= options_.newton_steps && !best.converged) return false;
     factor(problem, at, solution);
     const Eigen::VectorXd change = direction(at);
-    if (!change.allFinite() || solution.unsupported) {
+    if (!change.allFinite() || (solution.unsupported && leash_ == 0)) {
       factored_.clear();
       if (best.converged) break;
       return false;
@@ -293,6 +303,7 @@ struct ContactSolver<d>::Trial {
     solver.carries_ = false;
     solver.boldness_ = 1;
     solver.share_ = 0;
+    solver.leash_ = 0;
     solver.options_.newton_steps = steps;
     solver.forget();
   }
@@ -300,6 +311,52 @@ struct ContactSolver<d>::Trial {
   ContactSolver& solver;
   int steps;
 };
+
+// Forces and rigid motions under which all points that can move are pressed and stick: where such a body is to come to
+// rest. Points that pull there open in the next step.
+template <int d>
+void ContactSolver<d>::glue(const ContactProblem<d>& problem, ContactSolution<d>& solution) const {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    if (const OwnCompliance scales = own(problem, i); scales.normal > 0 && scales.tangential > 0)
+      for (int c = 0; c < d; ++c) rows.push_back(static_cast<Eigen::Index>(i) * d + c);
+  const auto n = static_cast<Eigen::Index>(rows.size()), m = rigid_.count();
+  Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n + m, n + m);
+  Eigen::VectorXd right(n + m);
+  system.topLeftCorner(n, n) = -compliance_(rows, rows);
+  system.topRightCorner(n, m) = give_ * rigid_.motions(rows, Eigen::all);
+  system.bottomLeftCorner(m, n) = rigid_.loads(rows, Eigen::all).transpose();
+  right << -problem.free(rows), problem.rigid;
+  for (Eigen::Index row = 0; row < n; row += d) {
+    const auto i = static_cast<std::size_t>(rows[static_cast<std::size_t>(row)] / d);
+    const ContactPoint<d>& point = problem.points[i];
+    const NormalCompliance& law = problem.law(i).compliance;
+    right.template segment<d>(row) -= point.penetration / problem.step * point.normal;
+    if (law.linear() && law.stiffness > 0)
+      system.template block<d, d>(row, row) -=
+          point.normal * point.normal.transpose() / (point.weight * law.stiffness * problem.step);
+  }
+  const Eigen::VectorXd found = system.completeOrthogonalDecomposition().solve(right);  // shares and slips as they fall
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(compliance_.rows());
+  force(rows) = found.head(n);
+  solution.added = beyond_known(problem, force);
+  solution.rigid = found.tail(m);
+}
+
+// Newton from there, on a leash while nothing holds the body. It has a place where points hold it in the end.
+template <int d>
+bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
+  double reach = problem.step * problem.free.cwiseAbs().maxCoeff();
+  for (const ContactPoint<d>& point : problem.points) reach = std::max(reach, std::abs(point.penetration));
+  const Trial trial(*this);
+  if (!line_search && reach > 0) leash_ = problem.step * problem.rigid.cwiseAbs().maxCoeff() / reach;
+  glue(problem, solution);
+  if (!newton(problem, line_search, solution)) return false;
+  leash_ = 0;
+  forget();
+  factor(problem, linearise(problem, solution.added, solution.rigid), solution);
+  return !solution.unsupported;
+}
 
 template <int d>
 ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
@@ -358,6 +415,9 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       solution.added = beyond_known(problem, pressed);
       return newton(problem, true, solution);
     });
+  if (rigid_.count() > 0 && !massive)  // it may have to come to the foundation first
+    for (const bool line_search : {true, false})
+      attempt(Stage::restart, [&] { return approach(problem, line_search, solution); });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
   // again from no force, with other scales of the tangential rows
   for (const double boldness : {1.0, 0.1, 10.0, 0.01})

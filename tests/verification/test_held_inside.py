@@ -1,0 +1,125 @@
+"""Supports that hold a contact part inside a rigid foundation: refused, or the run ends at that step; depths by hand.
+
+`python test_held_inside.py D` checks on the ranks it has.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from boxes import elasticity, field, right, scene
+from ranked import Checks, on_two_ranks
+
+import warmslip
+from warmslip import Run, _core, discretise
+from warmslip.materials import make_mesh
+
+SIDES = {2: ("left", "right", "bottom", "top"), 3: ("left", "right", "front", "back", "bottom", "top")}
+AXES = {"left": 0, "right": 0, "front": 1, "back": 1}
+check = Checks()
+
+
+def held(d: int, part: str, by: str, inside: Any, **contact: Any) -> Any:
+    """A body, pressed on `part`, whose support `by` moves towards it by `inside`."""
+    axis = AXES.get(part, d - 1)
+    move: list[Any] = [0.0] * d
+    out = 1 if part in ("right", "top", "back") else -1
+    load = [0.0] * d
+    load[axis] = 0.1 * out
+    move[axis] = f"{out} * ({inside})" if isinstance(inside, str) else out * inside
+    return scene(
+        d,
+        2,
+        elasticity=elasticity(d, 1.0, 0.3),
+        supports={"displacement": {by: move}},
+        loads={"body": load},
+        contact={"part": part, "stiffness": "rigid"} | contact,
+    )
+
+
+def beside(d: int, part: str) -> list[str]:
+    """The parts that share an edge with a part."""
+    return [by for by in SIDES[d] if AXES.get(by, d - 1) != AXES.get(part, d - 1)]
+
+
+@check
+def a_corner_inside_is_refused_on_every_part(d: int) -> None:
+    for part in SIDES[d]:
+        for by in beside(d, part):
+            one = held(d, part, by, 0.02, gap=0.005)
+            with pytest.raises(ValueError, match=rf"holds '{part}' 0\.015 inside its rigid .*at t = 0.*contact.gap"):
+                Run(one)
+
+
+@check
+def its_cures_are_cures(d: int) -> None:
+    for key, value in (("gap", 0.02), ("gap", 0.021), ("stiffness", 100.0)):
+        right(held(d, "bottom", "left", 0.02, **{"gap": 0.005} | {key: value}))
+    right(held(d, "bottom", "left", -0.02, gap=0.0))
+    soft = {
+        "bottom": warmslip.Law(compliance=lambda r: (100.0 * max(r, 0.0), 100.0 * (r > 0), 50.0 * max(r, 0.0) ** 2))
+    }
+    Run(held(d, "bottom", "left", 0.02, gap=0.005), laws=soft)  # the user's law takes the place of the rigid one
+
+
+@check
+def the_deepest_place_is_named(d: int) -> None:
+    one = held(d, "bottom", "left" if d == 2 else "front", 0.02, gap="0.018 - 0.015 * x")
+    x = 0.0 if d == 2 else 1.0  # the front's edge has its deepest end at x = 1
+    with pytest.raises(ValueError, match=f"'bottom' {0.02 - (0.018 - 0.015 * x):.3g} inside .* at [(]{x:.4g}, 0"):
+        Run(one)
+
+
+@check
+def a_run_ends_at_the_step_that_brings_it_inside(d: int) -> None:
+    """Steps of 1/4: the support goes in by t/50, and the gap is 0.012 or closes by as much as the support stays."""
+    for inside, gap, depth in (
+        ("t / 50", 0.012, 0.003),
+        (0.0, "0.012 - t / 50", 0.003),
+        ("t / 50", "0.024 - t / 60", 0.0035),
+    ):
+        one = held(d, "bottom", "left", inside, gap=gap)
+        job = Run(one)
+        taken = len(list(job.steps()))
+        assert job.outcome == "held_inside" and job.failure is not None
+        assert job.failure["step"] == taken + 1
+        assert f"holds 'bottom' {depth:.3g} inside" in job.failure["reason"]
+        assert taken == 2
+        kept, before = field(job, "u"), Run(one.override(**{"time.end": 0.5, "time.steps": 2}))
+        assert len(list(before.steps())) == 2 and before.outcome == "right"
+        assert np.abs(kept - field(before, "u")).max() <= 1e-14
+    right(held(d, "bottom", "left", "t / 50", gap=0.02))
+
+
+@check
+def gauss_points_count_where_all_their_nodes_are_held(d: int) -> None:
+    """A support that has the foot's facets at x < 1/2; of an edge alone no Gauss point is held, and its free nodes give way."""
+    rule = "gauss-2" if d == 2 else "gauss-3"
+    one = held(d, "bottom", "left", 0.02, gap=0.005, quadrature=rule)
+    box = make_mesh(one)
+    kind, parts = getattr(_core, f"Mesh{d}"), {name: np.array(facets) for name, facets in box.parts.items()}
+    nodes = np.array(box.nodes)
+    foot = parts["bottom"]
+    parts["left"] = foot[(nodes[foot][:, :, 0] < 0.6).all(axis=1)]
+    mesh = kind.from_lists(nodes, box.cells, parts)
+    with pytest.raises(ValueError, match=r"holds 'bottom' 0\.015 inside"):
+        discretise(one, mesh=mesh)
+    right(held(d, "bottom", "left", 0.02, gap=0.005, quadrature=rule))  # the edge alone is held
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("name", check.names)
+def test_on_one_rank(name: str, d: int) -> None:
+    check.run(name, d)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("d", [2, 3])
+def test_on_two_ranks(d: int) -> None:
+    on_two_ranks(__file__, d, check)
+
+
+if __name__ == "__main__":
+    check.main()

@@ -1,0 +1,139 @@
+"""Bodies without supports and inertia: what nothing holds is refused on every part alike, what contact holds is found.
+
+The foundation may be away at the start. `python test_unheld_bodies.py D` checks on the ranks it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from boxes import elasticity, right, scene
+from ranked import Checks, on_two_ranks
+
+from warmslip import Run, _core, discretise
+from warmslip.materials import make_mesh
+
+PARTS = {2: {"left": 0, "right": 0, "bottom": 1, "top": 1}}
+PARTS[3] = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
+FAR = ("right", "top", "back")
+check = Checks()
+
+
+def inwards(d: int, part: str, along: float = 0.0) -> list[float]:
+    """A unit of load that presses on a part, and some along the next axis."""
+    axis = PARTS[d][part]
+    load = [0.0] * d
+    load[axis] = 1.0 if part in FAR else -1.0
+    load[(axis + 1) % d] = along
+    return load
+
+
+def free(d: int, part: str, load: Any, mu: float = 0.5, n: int = 2, **contact: Any) -> Any:
+    friction = {"friction": {"coefficient": mu}} if mu else {}
+    return scene(
+        d,
+        n,
+        time={"steps": 2},
+        elasticity=elasticity(d, 1000.0, 0.3),
+        loads={"body": load},
+        contact={"part": part, "stiffness": 1e5} | friction | contact,
+    )
+
+
+def turned(one: Any, turn: Any) -> Any:
+    """The scene and its mesh about the origin; `turn` (d, d) is orthonormal."""
+    mesh = make_mesh(one)
+    kind = getattr(_core, f"Mesh{len(turn)}")
+    parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
+    body = (turn @ np.array(one.loads.body)).tolist()
+    return one.override(**{"loads.body": body}), kind.from_lists(np.array(mesh.nodes) @ turn.T, mesh.cells, parts)
+
+
+def outcome(one: Any, mesh: Any = None) -> str:
+    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    assert not list(job.steps()) or job.outcome == "right"
+    return job.outcome
+
+
+def unheld(d: int, part: str) -> Iterator[Any]:
+    """Scenes that have no solution, or a whole line of them."""
+    for stiffness in (1e5, "rigid"):
+        away = [-one for one in inwards(d, part)]
+        yield free(d, part, away, stiffness=stiffness)
+        yield free(d, part, away, stiffness=stiffness, gap=0.01)
+        yield free(d, part, inwards(d, part, 0.6), stiffness=stiffness)  # more than mu
+        yield free(d, part, inwards(d, part, -0.6), stiffness=stiffness, gap=0.01)
+        yield free(d, part, inwards(d, part, 0.1), mu=0, stiffness=stiffness)
+        yield free(d, part, inwards(d, part), mu=0, stiffness=stiffness)
+
+
+@check
+def what_nothing_holds_is_refused_on_every_part(d: int) -> None:
+    for part in PARTS[d]:
+        assert {outcome(one) for one in unheld(d, part)} == {"unsupported"}, part
+
+
+@check
+def and_whichever_way_it_is_turned(d: int) -> None:
+    turn = np.linalg.qr(np.random.default_rng(d).normal(size=(d, d)))[0]
+    turn[0] *= np.sign(np.linalg.det(turn))
+    for part in PARTS[d]:
+        assert {outcome(*turned(one, turn)) for one in unheld(d, part)} == {"unsupported"}, part
+
+
+@check
+def it_comes_to_its_foundation(d: int) -> None:
+    """A gap that a rigid motion closes, of 1 % or of fifty bodies, leaves the forces that there are without one."""
+    for part, axis in PARTS[d].items():
+        load = inwards(d, part, 0.1)
+        across = "yx"[axis] if d == 2 else "yzx"[axis]
+        slope = f"0.01 + 0.02 * {across}" if part not in FAR else 0.02  # beyond the origin a turn slides, too
+        for stiffness in (1e3, "rigid"):
+            near = right(free(d, part, load, stiffness=stiffness))
+            force = np.reshape(near.stepper.contact_force, (-1, d))
+            assert np.abs(force.sum(axis=0) - load).max() <= 1e-11
+            for gap in (0.01, slope, 50.0):
+                far = right(free(d, part, load, stiffness=stiffness, gap=gap), digits=6.0)
+                there = np.reshape(far.stepper.contact_force, (-1, d))
+                assert np.abs(there - force).max() <= 1e-9, (part, stiffness, gap)
+
+
+@check
+def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
+    """Statics: on a curved foundation the load's centre, 5/9, lies between the rows at 1/2 and 1, that take 4/3 and 1/6."""
+    body = [0.0] * (d - 1) + ["-1 - x"]
+    for gap in ("0.01 + 0.1 * (x - 0.3)**2", "0.1 * (x - 0.3)**2"):
+        job = right(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
+        force = np.reshape(job.stepper.contact_force, (-1, d))[:, -1]
+        place = np.asarray(job.discretisation.surface.positions)[:, 0]
+        rows = [-force[np.abs(place - x) < 0.1].sum() for x in (0.0, 0.5, 1.0)]
+        assert rows == pytest.approx([0.0, 4 / 3, 1 / 6], abs=1e-11)
+    balanced = free(d, "bottom", [0.0] * (d - 1) + [-1.0], stiffness="rigid", gap="0.01 + 0.1 * (x - 0.5)**2")
+    assert outcome(balanced) == "unsupported"  # on one row of points, about which it may turn
+
+
+@check
+def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
+    one = free(d, "bottom", [0.0] * (d - 1) + ["4 * t - 2.6"], gap=0.01).override(**{"time.steps": 4})
+    job = Run(one)
+    assert (len(list(job.steps())), job.outcome) == (2, "unsupported")
+    assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("name", check.names)
+def test_on_one_rank(name: str, d: int) -> None:
+    check.run(name, d)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("d", [2, 3])
+def test_on_two_ranks(d: int) -> None:
+    on_two_ranks(__file__, d, check)
+
+
+if __name__ == "__main__":
+    check.main()
