@@ -66,10 +66,11 @@ void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisatio
   at.value.template segment<d>(row) = out.value;
 }
 
+// Where the points move under the added forces and the rigid motions; the value holds all forces and the rigid balance.
 template <int d>
-typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
-                                                                     const Eigen::VectorXd& added,
-                                                                     const Eigen::VectorXd& rigid) const {
+typename ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactProblem<d>& problem,
+                                                                  const Eigen::VectorXd& added,
+                                                                  const Eigen::VectorXd& rigid) const {
   Linearisation at;
   const Eigen::VectorXd force = total(problem, added);
   at.velocity = known_velocity(problem);
@@ -80,19 +81,35 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
     at.velocity.noalias() += give_ * rigid_.motions * rigid;
     at.value.tail(rigid_.count()) = rigid_.motions.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
   }
+  return at;
+}
+
+// The law's residual at the velocities of `at` and the forces in its value, with own compliances that are so many times
+// smaller.
+template <int d>
+void ContactSolver<d>::obey(const ContactProblem<d>& problem, double firmness, Linearisation& at) const {
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i) * d;
     const OwnCompliance scales = own(problem, i);
     if (scales.normal > 0 && scales.tangential > 0) {
-      at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step, scales,
-                                 force.template segment<d>(row), at.velocity.template segment<d>(row));
+      at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step,
+                                 {scales.normal / firmness, scales.tangential / firmness},
+                                 at.value.template segment<d>(row), at.velocity.template segment<d>(row));
       at.value.template segment<d>(row) = at.points[i].value;
     } else {
       prescribed(problem, at, i);
     }
     at.key.push_back(at.points[i].key());
   }
+}
+
+template <int d>
+typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
+                                                                     const Eigen::VectorXd& added,
+                                                                     const Eigen::VectorXd& rigid) const {
+  Linearisation at = motion(problem, added, rigid);
+  obey(problem, 1, at);
   return at;
 }
 
@@ -112,6 +129,7 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
     tangent.topRightCorner(n, m) = give_ * motions;
     tangent.bottomLeftCorner(m, n) = motions.transpose();
     tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
+    tangent.bottomRightCorner(m, m).diagonal().array() += lean_;
   }
   for (Eigen::Index row = 0; row < n; row += d) {
     const auto i = static_cast<std::size_t>(closed_[static_cast<std::size_t>(row)] / d);
@@ -122,9 +140,10 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
     if (options_.proximal > 0) {
       const Point<d>& nu = problem.points[i].normal;
       const Tensor2<d> normal = nu * nu.transpose();
-      if (at.points[i].status == Status::stick)
+      const ContactLaw& law = problem.law(i);
+      if (at.points[i].status == Status::stick && law.friction.regularisation == 0)
         tangent.template block<d, d>(row, row) += options_.proximal * (Tensor2<d>::Identity() - normal);
-      const double share = problem.law(i).compliance.rigid() ? options_.proximal : share_;
+      const double share = law.compliance.rigid() ? options_.proximal : share_;
       if (at.points[i].touching)
         tangent.template block<d, d>(row, row) += std::max(0.0, share - nu.dot(at.points[i].by_force * nu)) * normal;
     }
@@ -270,6 +289,7 @@ struct ContactSolver<d>::Trial {
     solver.carries_ = false;
     solver.boldness_ = 1;
     solver.share_ = 0;
+    solver.lean_ = 0;
     solver.options_.newton_steps = steps;
     solver.forget();
   }
@@ -346,7 +366,14 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       move();
       return newton(problem, true, solution);
     });
-  attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
+  attempt(Stage::fixed_point, [&] {
+    const Trial trial(*this);
+    const bool unsupported = solution.unsupported;
+    move();
+    const bool found = fixed_point(problem, solution);
+    solution.unsupported = unsupported;
+    return found;
+  });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   solution.unsupported = solution.unsupported && !solution.converged;
