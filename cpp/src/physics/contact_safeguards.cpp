@@ -81,6 +81,7 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
 // The friction bounds frozen, the step is convex: solve it, move the bounds, repeat; Newton finishes from there.
 template <int d>
 bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  const double proximal = options_.proximal;
   ContactProblem<d> frozen = problem;
   frozen.laws.clear();
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
@@ -104,10 +105,13 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     finished.velocity = velocity;
     const bool obeyed = accept(problem, finished);
     if (!obeyed && step % 10 != 9 && (step & (step + 1)) != 0) continue;
-    for (const bool searched : {true, false}) {
+    for (const double part : {1.0, 1e-3}) {  // near the solution less has to draw points to the share they had
       forget();
       finished = solution;
-      if (newton(problem, searched, finished)) {
+      options_.proximal = part * proximal;
+      const bool done = newton(problem, part == 1, finished);
+      options_.proximal = proximal;
+      if (done) {
         solution = std::move(finished);
         return true;
       }

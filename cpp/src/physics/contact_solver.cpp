@@ -284,18 +284,18 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
 // Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
 template <int d>
 struct ContactSolver<d>::Trial {
-  explicit Trial(ContactSolver& owner) : solver(owner), steps(owner.options_.newton_steps) { solver.forget(); }
+  explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.forget(); }
   ~Trial() {
     solver.carries_ = false;
     solver.boldness_ = 1;
     solver.share_ = 0;
     solver.lean_ = 0;
-    solver.options_.newton_steps = steps;
+    solver.options_ = options;
     solver.forget();
   }
   Trial(const Trial&) = delete;
   ContactSolver& solver;
-  int steps;
+  ContactOptions options;
 };
 
 template <int d>
