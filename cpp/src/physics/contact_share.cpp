@@ -8,43 +8,41 @@ namespace {
 
 using Shape = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// A point that shares its force with others, and the forces that its law allows at the velocity it has. On a rigid
-// foundation they are the cone of all pressures with their friction: while the point rests with any up to the bound,
-// while it slips with just that. Elsewhere the penetration gives the pressure, and a resting point shares its friction.
+// A point that shares its force with others. At rest it shares its friction, up to the bound; on a rigid foundation also
+// its pressure, of which the bound may be a multiple. A point that slips shares pressure that its friction does not follow.
 template <int d>
 struct Sharing {
   Eigen::Index point;
   double weight;
-  double cohesion;     // force: friction without pressure, or the whole bound where the pressure is given
-  double coefficient;  // friction per pressure
-  bool pressed;        // shares its pressure as well
-  bool slips;
-  Point<d> normal, along;  // along: where its friction points while it slips
+  double bound;        // force: of the friction, at no pressure where that is shared
+  double coefficient;  // friction per shared pressure
+  bool rests, pressed;
+  Point<d> normal;
 
   struct Projection {
     Point<d> force;
     Tensor2<d> derivative;
   };
-  // The allowed force that is nearest to one, and how it follows it.
+  // The force, of those that it may have, that is nearest to one, and how it follows that one.
   Projection nearest(const Point<d>& to) const {
-    const Tensor2<d> tangential = Tensor2<d>::Identity() - normal * normal.transpose();
-    const Point<d> t = tangential * to;
-    const double size = t.norm(), p = to.dot(normal);
-    const Point<d> way = slips ? along : size > 0 ? Point<d>(t / size) : Point<d>(Point<d>::Zero());
-    if (!slips && (size <= cohesion + (pressed ? coefficient * std::max(p, 0.0) : 0)))  // below the bound
-      return {t + (pressed ? std::max(p, 0.0) : 0) * normal,
-              tangential + (pressed && p > 0 ? 1.0 : 0.0) * normal * normal.transpose()};
-    const Point<d> edge = normal + coefficient * way;
-    const double pressure = pressed ? std::max((to - cohesion * way).dot(edge) / edge.squaredNorm(), 0.0) : 0,
-                 bound = cohesion + coefficient * pressure;
-    Projection out{pressure * normal + bound * way, Tensor2<d>::Zero()};
-    if (pressure > 0) out.derivative += edge * edge.transpose() / edge.squaredNorm();
-    if (!slips) out.derivative += bound / size * (tangential - way * way.transpose());  // the friction turns
-    return out;
+    const Tensor2<d> across = normal * normal.transpose(), tangential = Tensor2<d>::Identity() - across;
+    const Point<d> t = rests ? Point<d>(tangential * to) : Point<d>(Point<d>::Zero());
+    const double p = pressed ? to.dot(normal) : 0, size = t.norm();
+    if (!rests || size <= bound + coefficient * std::max(p, 0.0))
+      return {t + std::max(p, 0.0) * normal,
+              (rests ? 1.0 : 0.0) * tangential + (p > 0 ? 1.0 : 0.0) * across};
+    const Point<d> way = t / size, edge = normal + coefficient * way;  // on the edge of the cone, or at its tip
+    const double pressure = pressed ? std::max((p + coefficient * (size - bound)) / edge.squaredNorm(), 0.0) : 0,
+                 friction = bound + coefficient * pressure;
+    return {pressure * normal + friction * way,
+            friction / size * (tangential - way * way.transpose()) +
+                (pressure > 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
   }
   // What it shares of a force.
   Point<d> part(const Point<d>& force) const {
-    return pressed ? force : Point<d>(force - force.dot(normal) * normal);
+    const Point<d> pressure = force.dot(normal) * normal;
+    return (rests ? Point<d>(force - pressure) : Point<d>(Point<d>::Zero())) +
+           (pressed ? pressure : Point<d>(Point<d>::Zero()));
   }
 };
 
@@ -66,23 +64,19 @@ std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactS
     const Friction& friction = law.friction;
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Point<d> w = solution.velocity.template segment<d>(row), force = solution.force.template segment<d>(row);
-    const Point<d> slip = w - w.dot(point.normal) * point.normal;
-    const double speed = slip.norm(), smeared = std::hypot(speed, friction.regularisation);
+    const double speed = (w - w.dot(point.normal) * point.normal).norm();
     const double pressure = std::max(force.dot(point.normal), 0.0) / point.weight;
     const double bound = point.weight * friction.bound(pressure, speed).value;
     // the power that will be missing is at most twice bound times speed
-    const bool rests = friction.regularisation == 0 && speed <= tolerance * fastest;
+    const bool rests = friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest;
     const double r = point.penetration + problem.step * w.dot(point.normal);
-    const bool pressed = law.compliance.rigid() && !point.prescribed && !friction.custom &&
-                         friction.limit == unlimited && std::abs(r) <= tolerance * reach;
-    if (!pressed && !(rests && bound > 0)) continue;
-    Sharing<d> one{static_cast<Eigen::Index>(i), point.weight, bound, 0, pressed, !rests, point.normal, Point<d>::Zero()};
-    if (pressed) {
-      one.cohesion = point.weight * friction.cohesion;
-      one.coefficient = friction.bound(1, speed).by_pressure;
-    }
-    if (!rests) one.along = slip / smeared;
-    out.push_back(one);
+    const bool pressed = law.compliance.rigid() && !point.prescribed && std::abs(r) <= tolerance * reach &&
+                         !friction.custom && friction.limit == unlimited && (rests || friction.coefficient == 0);
+    if (rests && pressed)
+      out.push_back({static_cast<Eigen::Index>(i), point.weight, point.weight * friction.cohesion,
+                     friction.coefficient, rests, pressed, point.normal});
+    else if (rests || pressed)
+      out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, 0, rests, pressed, point.normal});
   }
   return out;
 }
@@ -143,20 +137,15 @@ template <int d>
 bool share_least(const ContactProblem<d>& problem, const Shape& shape, double tolerance, ContactSolution<d>& solution) {
   const std::vector<Sharing<d>> points = sharing(problem, solution, tolerance);
   if (points.empty()) return true;
-  const auto name = [&](const Sharing<d>& q) {
-    const double pressure = solution.force.template segment<d>(q.point * d).dot(q.normal);
-    const bool rubs = q.cohesion + q.coefficient * pressure > 0;
-    solution.status[static_cast<std::size_t>(q.point)] =
-        !q.slips && rubs ? Status::stick : rubs || pressure > 0 ? Status::slip : Status::open;
-  };
-  std::for_each(points.begin(), points.end(), name);
+  for (const auto& q : points)
+    if (q.rests) solution.status[static_cast<std::size_t>(q.point)] = Status::stick;
   Eigen::VectorXd asked = Eigen::VectorXd::Zero(shape.cols() * d);
   const Dual<d> dual{points, shape, asked};
   double widest = 0;
   for (const auto& q : points) {
     const Point<d> force = solution.force.template segment<d>(q.point * d);
     dual.add(q, q.part(force), asked);
-    widest = std::max({widest, q.cohesion, q.part(force).norm()});
+    widest = std::max({widest, q.bound, q.part(force).norm()});
   }
   Eigen::VectorXd y = Eigen::VectorXd::Zero(asked.size()), gradient = dual.gradient(y);
   const double enough = 8 * std::numeric_limits<double>::epsilon() * widest;
@@ -180,7 +169,6 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
     const Point<d> change = q.nearest(dual.at(q, y)).force - q.part(force);
     force += change;
     solution.added.template segment<d>(q.point * d) += change;
-    name(q);
   }
   return true;
 }
