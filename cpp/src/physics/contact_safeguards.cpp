@@ -28,17 +28,17 @@ void freeze(const ContactProblem<d>& problem, const Eigen::VectorXd& force, cons
 
 }  // namespace
 
-// With constant friction bounds, and forces drawn towards those of `centre`, the motion minimises a convex function with
-// a continuous gradient: 1/2 added . C added, the energy of the rigid motions and the law's own, smoothed. Newton's
-// method with a search for a small slope along its direction finds the minimum from anywhere.
+// With constant friction bounds, and forces drawn towards those of `centre`, the motion minimises a convex function
+// with a continuous gradient: 1/2 added . C added, the energy of the rigid motions and the law's own, smoothed.
+// Newton's method with a search for a small slope along its direction finds the minimum from anywhere.
 template <int d>
 bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::VectorXd& centre, double firmness,
                               ContactSolution<d>& solution) {
   const Eigen::Index all = compliance_.rows(), motions = rigid_.count();
-  const Eigen::VectorXd before_rigid = solution.rigid;
+  const Eigen::VectorXd motions_before = solution.rigid;
   const auto unmet = [&](const Eigen::VectorXd& added, const Eigen::VectorXd& rigid) {
     Linearisation at = motion(problem, added, rigid);
-    at.value.tail(motions) += lean_ * (rigid - before_rigid);
+    at.value.tail(motions) += lean_ * (rigid - motions_before);
     const Eigen::VectorXd force = at.value.head(all);
     at.value.head(all) = centre;
     obey(problem, firmness, at);
@@ -78,7 +78,9 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
   return true;
 }
 
-// The friction bounds frozen, the step is convex: solve it, move the bounds, repeat; Newton finishes from there.
+// Friction bounds frozen, the step is convex: draw near its solution, move the bounds half way, repeat; Newton finishes
+// from there. An augmented Lagrangian for the forces and a fixed point for the bounds at once, indifferent to
+// stiffness.
 template <int d>
 bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   const double proximal = options_.proximal;
@@ -89,7 +91,8 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     frozen.laws.push_back({problem.law(i).compliance, {}});
     frozen.laws[i].friction.regularisation = problem.law(i).friction.regularisation;
   }
-  Eigen::VectorXd force = total(problem, solution.added), velocity = motion(problem, solution.added, solution.rigid).velocity;
+  Eigen::VectorXd force = total(problem, solution.added),
+                  velocity = motion(problem, solution.added, solution.rigid).velocity;
   for (int step = 0; step < options_.fixed_point_steps; ++step) {
     const double firmness = firmness_of(step);
     freeze(problem, force, velocity, step == 0 ? 1.0 : 0.5, frozen);
@@ -103,8 +106,7 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     ContactSolution<d> finished = solution;
     finished.force = force;
     finished.velocity = velocity;
-    const bool obeyed = accept(problem, finished);
-    if (!obeyed && step % 10 != 9 && (step & (step + 1)) != 0) continue;
+    if (!accept(problem, finished) && step % 10 != 9 && (step & (step + 1)) != 0) continue;
     for (const double part : {1.0, 1e-3}) {  // near the solution less has to draw points to the share they had
       forget();
       finished = solution;

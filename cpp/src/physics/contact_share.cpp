@@ -8,8 +8,9 @@ namespace {
 
 using Shape = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// A point that shares its force with others. At rest it shares its friction, up to the bound; on a rigid foundation also
-// its pressure, of which the bound may be a multiple. A point that slips shares pressure that its friction does not follow.
+// A point that shares its force with others. At rest it shares its friction, up to the bound; on a rigid foundation
+// also its pressure, of which the bound may be a multiple. A point that slips shares pressure that its friction does
+// not follow.
 template <int d>
 struct Sharing {
   Eigen::Index point;
@@ -29,8 +30,7 @@ struct Sharing {
     const Point<d> t = rests ? Point<d>(tangential * to) : Point<d>(Point<d>::Zero());
     const double p = pressed ? to.dot(normal) : 0, size = t.norm();
     if (!rests || size <= bound + coefficient * std::max(p, 0.0))
-      return {t + std::max(p, 0.0) * normal,
-              (rests ? 1.0 : 0.0) * tangential + (p > 0 ? 1.0 : 0.0) * across};
+      return {t + std::max(p, 0.0) * normal, (rests ? 1.0 : 0.0) * tangential + (p > 0 ? 1.0 : 0.0) * across};
     const Point<d> way = t / size, edge = normal + coefficient * way;  // on the edge of the cone, or at its tip
     const double pressure = pressed ? std::max((p + coefficient * (size - bound)) / edge.squaredNorm(), 0.0) : 0,
                  friction = bound + coefficient * pressure;
@@ -73,8 +73,8 @@ std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactS
     const bool pressed = law.compliance.rigid() && !point.prescribed && std::abs(r) <= tolerance * reach &&
                          !friction.custom && friction.limit == unlimited && (rests || friction.coefficient == 0);
     if (rests && pressed)
-      out.push_back({static_cast<Eigen::Index>(i), point.weight, point.weight * friction.cohesion,
-                     friction.coefficient, rests, pressed, point.normal});
+      out.push_back({static_cast<Eigen::Index>(i), point.weight, point.weight * friction.cohesion, friction.coefficient,
+                     rests, pressed, point.normal});
     else if (rests || pressed)
       out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, 0, rests, pressed, point.normal});
   }
