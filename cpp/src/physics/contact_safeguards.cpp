@@ -8,8 +8,10 @@ namespace warmslip {
 
 namespace {
 
+constexpr int cycle = 9;  // steps
+
 // Of the proximal term, against a point's own compliance: firm ones converge in fewer steps and soft ones round less.
-double firmness_of(int step) { return 32 * std::pow(4.0, step % 9); }
+double firmness_of(int step) { return 32 * std::pow(4.0, step % cycle); }
 
 // The law of every point with the friction bound that belongs to a force and a velocity, kept as a constant.
 template <int d>
@@ -93,14 +95,17 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
   }
   Eigen::VectorXd force = total(problem, solution.added),
                   velocity = motion(problem, solution.added, solution.rigid).velocity;
-  for (int step = 0; step < options_.fixed_point_steps; ++step) {
+  ContactSolution<d> best;  // the tolerance is met: some steps more may reach round-off
+  int last = options_.fixed_point_steps;
+  for (int step = 0; step < last; ++step) {
+    if (best.converged && best.law_residual <= 1e-2 * options_.tolerance) break;
     const double firmness = firmness_of(step);
     freeze(problem, force, velocity, step == 0 ? 1.0 : 0.5, frozen);
     forget();
     lean_ = 1 / firmness;
     const bool solved = convex(frozen, force, firmness, solution);
     lean_ = 0;
-    if (!solved) return false;
+    if (!solved) break;
     force = total(problem, solution.added);
     velocity = motion(problem, solution.added, solution.rigid).velocity;
     ContactSolution<d> finished = solution;
@@ -113,15 +118,20 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
       options_.proximal = part * proximal;
       const bool done = newton(problem, part == 1, finished);
       options_.proximal = proximal;
-      if (done) {
-        solution = std::move(finished);
-        return true;
+      if (done && !(best.converged && finished.law_residual >= best.law_residual)) {
+        if (!best.converged) last = std::min(last, step + 2 * cycle);
+        best = finished;
+        best.converged = true;
       }
       solution.iterations = finished.iterations;
       solution.factorizations = finished.factorizations;
     }
   }
-  return false;
+  if (!best.converged) return false;
+  best.iterations = solution.iterations;
+  best.factorizations = solution.factorizations;
+  solution = std::move(best);
+  return true;
 }
 
 template <int d>
