@@ -54,6 +54,11 @@ def fields(job: Run) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value is not None}
 
 
+def forces_of(job: Run) -> Any:
+    """Contact forces, (points, d)."""
+    return np.reshape(job.stepper.contact_force, (-1, job.discretisation.dim))
+
+
 def misses(one: dict[str, Any], other: dict[str, Any]) -> dict[str, float]:
     """Largest difference of each field over its largest value in `other`."""
     return {name: float(np.abs(one[name] - exact).max() / np.abs(exact).max()) for name, exact in other.items()}

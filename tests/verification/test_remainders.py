@@ -241,6 +241,37 @@ def shares_beside_a_clamped_edge(d: int) -> None:
     assert np.abs(found[:, 0]).max() > 1e-4 and np.abs(found - again).max() <= 1e-12 * np.abs(found).max()
 
 
+@check
+def pressures_on_a_rigid_foundation(d: int) -> None:
+    """Resting points have the least share of their pressure: one only, and linear in every facet but for those that bear none."""
+    for friction in ({}, {"friction": {"coefficient": 0.3, "cohesion": 0.001}}):
+        one = scene(
+            d,
+            3,
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.25),
+            supports={"displacement": {"top": along(d, "-0.001 * t", "0.0008 * t")}},
+            contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-3"} | friction,
+        )
+        job, other = right(one), Run(one, backend="petsc")
+        for _ in other.steps():
+            pass
+        found, again = forces(job, d), forces(other, d)
+        assert np.abs(found - again).max() <= 1e-11 * np.abs(found).max()
+        traction = found / np.asarray(job.discretisation.surface.weights)[:, None]
+        pressing = -traction[:, -1]
+        assert pressing.min() >= 0
+        if friction:
+            continue  # at its bound the friction holds the pressure back
+        compliance = np.array(job.stepper.contact_compliance)[d - 1 :: d, d - 1 :: d]
+        values, modes = np.linalg.eigh(compliance)  # whose range are the fields that are linear in every facet
+        linear = modes[:, values > 1e-9 * values[-1]]
+        bears = pressing > 0
+        nodal = np.linalg.lstsq(linear[bears], pressing[bears], rcond=None)[0]
+        assert bears.sum() > linear.shape[1]
+        assert np.abs(linear[bears] @ nodal - pressing[bears]).max() <= 1e-9 * pressing.max()
+
+
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", check.names)
 def test_remainders(name: str, d: int) -> None:

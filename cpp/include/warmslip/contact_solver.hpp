@@ -11,7 +11,7 @@ namespace warmslip {
 struct ContactOptions {
   double tolerance = 1e-12;  ///< on the residual of the contact law, relative
   int newton_steps = 40;
-  int fixed_point_steps = 4000;
+  int fixed_point_steps = 200;
   int enumerate_points = 6;  ///< enumerate the statuses of at most so many points (d = 2)
   double proximal = 0;       ///< > 0 where contact points outnumber contact nodes; dimensionless
 };
@@ -95,6 +95,9 @@ class ContactSolver {
 
     Eigen::Index size() const { return basis.cols(); }
   };
+  Linearisation motion(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
+                       const Eigen::VectorXd& rigid) const;
+  void obey(const ContactProblem<d>& problem, double firmness, Linearisation& at) const;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
@@ -102,6 +105,9 @@ class ContactSolver {
   Eigen::VectorXd direction(const Linearisation& at) const;
   Tensor2<d> shared(const ContactProblem<d>& problem, const PointResidual<d>& at, Eigen::Index point) const;
   bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
+  bool convex(const ContactProblem<d>& problem, const Eigen::VectorXd& centre, double firmness,
+              ContactSolution<d>& solution);
+  bool held(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);
@@ -117,6 +123,7 @@ class ContactSolver {
   Eigen::MatrixXd carried_;     // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
   double share_ = 0;            // > 0: pressed points share their force on a stiff foundation as on a rigid one
   double leash_ = 0;            // > 0: force per velocity that holds a body without mass while nothing else does
+  double lean_ = 0;             // > 0: an inertia that draws the rigid motions to where they were, dimensionless
   bool carries_ = false;        // whether a point's own compliance includes the rigid motions
   double give_ = 1;             // velocity per force, the unit of the rigid motions
   double spectral_ = 0;         // largest row sum of |compliance|, a bound on its eigenvalues

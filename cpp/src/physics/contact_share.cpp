@@ -8,66 +8,103 @@ namespace {
 
 using Shape = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// A point at rest: its index, weight, friction bound as a force, and the projection onto its tangent plane.
+// A point that shares its force with others. At rest it shares its friction, up to the bound; on a rigid foundation
+// also its pressure, of which the bound may be a multiple. A point that slips shares pressure that its friction does
+// not follow.
 template <int d>
-struct Resting {
+struct Sharing {
   Eigen::Index point;
-  double weight, bound;
-  Tensor2<d> tangential;
+  double weight;
+  double bound;        // force: of the friction, at no pressure where that is shared
+  double coefficient;  // friction per shared pressure
+  bool rests, pressed;
+  Point<d> normal;
+
+  struct Projection {
+    Point<d> force;
+    Tensor2<d> derivative;
+  };
+  // The force, of those that it may have, that is nearest to one, and how it follows that one.
+  Projection nearest(const Point<d>& to) const {
+    const Tensor2<d> across = normal * normal.transpose(), tangential = Tensor2<d>::Identity() - across;
+    const Point<d> t = rests ? Point<d>(tangential * to) : Point<d>(Point<d>::Zero());
+    const double p = pressed ? to.dot(normal) : 0, size = t.norm();
+    if (!rests || size <= bound + coefficient * std::max(p, 0.0))
+      return {t + std::max(p, 0.0) * normal, (rests ? 1.0 : 0.0) * tangential + (p > 0 ? 1.0 : 0.0) * across};
+    const Point<d> way = t / size, edge = normal + coefficient * way;  // on the edge of the cone, or at its tip
+    const double pressure = pressed ? std::max((p + coefficient * (size - bound)) / edge.squaredNorm(), 0.0) : 0,
+                 friction = bound + coefficient * pressure;
+    return {pressure * normal + friction * way,
+            friction / size * (tangential - way * way.transpose()) +
+                (pressure > 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
+  }
+  // What it shares of a force.
+  Point<d> part(const Point<d>& force) const {
+    const Point<d> pressure = force.dot(normal) * normal;
+    return (rests ? Point<d>(force - pressure) : Point<d>(Point<d>::Zero())) +
+           (pressed ? pressure : Point<d>(Point<d>::Zero()));
+  }
 };
 
 template <int d>
-std::vector<Resting<d>> at_rest(const ContactProblem<d>& problem, const ContactSolution<d>& solution,
+std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactSolution<d>& solution,
                                 double tolerance) {
-  double fastest = 0;
-  for (Eigen::Index row = 0; row < problem.free.size(); row += d)
-    fastest = std::max(
-        {fastest, problem.free.template segment<d>(row).norm(), solution.velocity.template segment<d>(row).norm()});
-  std::vector<Resting<d>> out;
+  double fastest = 0, reach = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const ContactPoint<d>& point = problem.points[i];
+    const auto row = static_cast<Eigen::Index>(i) * d;
+    const Point<d> free = problem.free.template segment<d>(row), w = solution.velocity.template segment<d>(row);
+    fastest = std::max({fastest, free.norm(), w.norm()});
+    reach = std::max(reach, point.displacement.norm() + std::abs(point.gap) + problem.step * (free.norm() + w.norm()));
+  }
+  std::vector<Sharing<d>> out;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const ContactPoint<d>& point = problem.points[i];
     const ContactLaw& law = problem.law(i);
+    const Friction& friction = law.friction;
     const auto row = static_cast<Eigen::Index>(i) * d;
-    const Point<d> w = solution.velocity.template segment<d>(row);
-    const Tensor2<d> tangential = Tensor2<d>::Identity() - point.normal * point.normal.transpose();
-    const double speed = (tangential * w).norm();
-    const double pressure = std::max(solution.force.template segment<d>(row).dot(point.normal), 0.0) / point.weight;
-    const double bound = point.weight * law.friction.bound(pressure, speed).value;
+    const Point<d> w = solution.velocity.template segment<d>(row), force = solution.force.template segment<d>(row);
+    const double speed = (w - w.dot(point.normal) * point.normal).norm();
+    const double pressure = std::max(force.dot(point.normal), 0.0) / point.weight;
+    const double bound = point.weight * friction.bound(pressure, speed).value;
     // the power that will be missing is at most twice bound times speed
-    if (law.friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest)
-      out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, tangential});
+    const bool rests = friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest;
+    const double r = point.penetration + problem.step * w.dot(point.normal);
+    const bool pressed = law.compliance.rigid() && !point.prescribed && std::abs(r) <= tolerance * reach &&
+                         !friction.custom && friction.limit == unlimited && (rests || friction.coefficient == 0);
+    if (rests && pressed)
+      out.push_back({static_cast<Eigen::Index>(i), point.weight, point.weight * friction.cohesion, friction.coefficient,
+                     rests, pressed, point.normal});
+    else if (rests || pressed)
+      out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, 0, rests, pressed, point.normal});
   }
   return out;
 }
 
-// The dual problem: forces lambda_q = proj_bound(weight y(q)) with nodal y minimise the convex function whose gradient
-// is what they put on the nodes less what is asked for.
+// The dual problem: forces lambda_q nearest to weight y(q) with nodal y minimise the convex function whose gradient is
+// what they put on the nodes less what is asked for.
 template <int d>
 struct Dual {
-  const std::vector<Resting<d>>& points;
+  const std::vector<Sharing<d>>& points;
   const Shape& shape;
   const Eigen::VectorXd& asked;  // (d nodes)
 
-  Point<d> at(const Resting<d>& q, const Eigen::VectorXd& y) const {
+  Point<d> at(const Sharing<d>& q, const Eigen::VectorXd& y) const {
     Point<d> value = Point<d>::Zero();
     for (Shape::InnerIterator it(shape, q.point); it; ++it) value += it.value() * y.template segment<d>(it.col() * d);
-    return q.tangential * value;
-  }
-  static Point<d> force(const Resting<d>& q, const Point<d>& y) {
-    const double size = q.weight * y.norm();
-    return size > q.bound ? Point<d>(q.bound / y.norm() * y) : Point<d>(q.weight * y);
+    return q.weight * value;
   }
   double value(const Eigen::VectorXd& y) const {
     double sum = -asked.dot(y);
     for (const auto& q : points) {
-      const double size = at(q, y).norm();
-      sum += q.weight * size > q.bound ? q.bound * (size - 0.5 * q.bound / q.weight) : 0.5 * q.weight * size * size;
+      const Point<d> wanted = at(q, y), force = q.nearest(wanted).force;
+      sum += force.dot(wanted - 0.5 * force) / q.weight;
     }
     return sum;
   }
   Eigen::VectorXd gradient(const Eigen::VectorXd& y) const {
     Eigen::VectorXd out = -asked;
-    for (const auto& q : points) add(q, force(q, at(q, y)), out);
+    for (const auto& q : points) add(q, q.nearest(at(q, y)).force, out);
     return out;
   }
   // its generalised derivative, with something on the diagonal for directions in which nothing rests
@@ -75,10 +112,7 @@ struct Dual {
     double heaviest = 0;
     std::vector<Eigen::Triplet<double>> entries;
     for (const auto& q : points) {
-      const Point<d> v = at(q, y);
-      Tensor2<d> own = q.weight * q.tangential;
-      if (q.weight * v.norm() > q.bound)
-        own = q.bound / v.norm() * (q.tangential - v * v.transpose() / v.squaredNorm());
+      const Tensor2<d> own = q.weight * q.nearest(at(q, y)).derivative;
       heaviest = std::max(heaviest, q.weight);
       for (Shape::InnerIterator i(shape, q.point); i; ++i)
         for (Shape::InnerIterator j(shape, q.point); j; ++j)
@@ -91,7 +125,7 @@ struct Dual {
     out.setFromTriplets(entries.begin(), entries.end());
     return out;
   }
-  void add(const Resting<d>& q, const Point<d>& force, Eigen::VectorXd& nodal) const {
+  void add(const Sharing<d>& q, const Point<d>& force, Eigen::VectorXd& nodal) const {
     for (Shape::InnerIterator it(shape, q.point); it; ++it)
       nodal.template segment<d>(it.col() * d) += it.value() * force;
   }
@@ -101,15 +135,17 @@ struct Dual {
 
 template <int d>
 bool share_least(const ContactProblem<d>& problem, const Shape& shape, double tolerance, ContactSolution<d>& solution) {
-  const std::vector<Resting<d>> points = at_rest(problem, solution, tolerance);
+  const std::vector<Sharing<d>> points = sharing(problem, solution, tolerance);
   if (points.empty()) return true;
-  for (const auto& q : points) solution.status[static_cast<std::size_t>(q.point)] = Status::stick;
+  for (const auto& q : points)
+    if (q.rests) solution.status[static_cast<std::size_t>(q.point)] = Status::stick;
   Eigen::VectorXd asked = Eigen::VectorXd::Zero(shape.cols() * d);
   const Dual<d> dual{points, shape, asked};
   double widest = 0;
   for (const auto& q : points) {
-    dual.add(q, q.tangential * solution.force.template segment<d>(q.point * d), asked);
-    widest = std::max(widest, q.bound);
+    const Point<d> force = solution.force.template segment<d>(q.point * d);
+    dual.add(q, q.part(force), asked);
+    widest = std::max({widest, q.bound, q.part(force).norm()});
   }
   Eigen::VectorXd y = Eigen::VectorXd::Zero(asked.size()), gradient = dual.gradient(y);
   const double enough = 8 * std::numeric_limits<double>::epsilon() * widest;
@@ -130,7 +166,7 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
   if (!(gradient.cwiseAbs().maxCoeff() <= 0.5 * tolerance * widest)) return false;
   for (const auto& q : points) {
     auto force = solution.force.template segment<d>(q.point * d);
-    const Point<d> change = dual.force(q, dual.at(q, y)) - q.tangential * Point<d>(force);
+    const Point<d> change = q.nearest(dual.at(q, y)).force - q.part(force);
     force += change;
     solution.added.template segment<d>(q.point * d) += change;
   }

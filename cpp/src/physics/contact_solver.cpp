@@ -74,10 +74,11 @@ void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisatio
   at.value.template segment<d>(row) = out.value;
 }
 
+// Where the points move under the added forces and the rigid motions; the value holds all forces and the rigid balance.
 template <int d>
-typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
-                                                                     const Eigen::VectorXd& added,
-                                                                     const Eigen::VectorXd& rigid) const {
+typename ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactProblem<d>& problem,
+                                                                  const Eigen::VectorXd& added,
+                                                                  const Eigen::VectorXd& rigid) const {
   Linearisation at;
   const Eigen::VectorXd force = total(problem, added);
   at.velocity = known_velocity(problem);
@@ -88,19 +89,35 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
     at.velocity.noalias() += give_ * rigid_.motions * rigid;
     at.value.tail(rigid_.count()) = rigid_.loads.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
   }
+  return at;
+}
+
+// The law's residual at the velocities of `at` and the forces in its value, with own compliances that are so many times
+// smaller.
+template <int d>
+void ContactSolver<d>::obey(const ContactProblem<d>& problem, double firmness, Linearisation& at) const {
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i) * d;
     const OwnCompliance scales = own(problem, i);
     if (scales.normal > 0 && scales.tangential > 0) {
-      at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step, scales,
-                                 force.template segment<d>(row), at.velocity.template segment<d>(row));
+      at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step,
+                                 {scales.normal / firmness, scales.tangential / firmness},
+                                 at.value.template segment<d>(row), at.velocity.template segment<d>(row));
       at.value.template segment<d>(row) = at.points[i].value;
     } else {
       prescribed(problem, at, i);
     }
     at.key.push_back(at.points[i].key());
   }
+}
+
+template <int d>
+typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const ContactProblem<d>& problem,
+                                                                     const Eigen::VectorXd& added,
+                                                                     const Eigen::VectorXd& rigid) const {
+  Linearisation at = motion(problem, added, rigid);
+  obey(problem, 1, at);
   return at;
 }
 
@@ -136,14 +153,19 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
     }
   }
   tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
+  tangent.bottomRightCorner(m, m).diagonal().array() += lean_;
   // anew: Eigen's matrices lose their memory when they grow and cannot
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
   solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
-  if (solution.unsupported && leash_ > 0) {  // the load then moves the body until something holds it
-    tangent.bottomRightCorner(m, m).diagonal().array() += give_ * leash_;
-    tangent_.compute(tangent);
+  if (leash_ > 0) {
+    Eigen::MatrixXd weightless = tangent;
+    weightless.bottomRightCorner(m, m) -= give_ * rigid_.inertia;
+    if (singular(Eigen::PartialPivLU<Eigen::MatrixXd>(weightless))) {
+      tangent.bottomRightCorner(m, m).diagonal().array() += give_ * leash_;
+      tangent_.compute(tangent);  // the load then moves the body until something holds it
+    }
   }
   factored_ = at.key;
   ++solution.factorizations;
@@ -159,8 +181,10 @@ Tensor2<d> ContactSolver<d>::shared(const ContactProblem<d>& problem, const Poin
   const Tensor2<d> normal = nu * nu.transpose();
   Tensor2<d> out = Tensor2<d>::Zero();
   if (options_.proximal <= 0) return out;
-  if (at.status == Status::stick) out += options_.proximal * (Tensor2<d>::Identity() - normal);
-  const double share = problem.law(i).compliance.rigid() ? options_.proximal : share_;
+  const ContactLaw& law = problem.law(i);
+  if (at.status == Status::stick && law.friction.regularisation == 0)
+    out += options_.proximal * (Tensor2<d>::Identity() - normal);
+  const double share = law.compliance.rigid() ? options_.proximal : share_;
   if (at.touching) out += std::max(0.0, share - nu.dot(at.by_force * nu)) * normal;
   return out;
 }
@@ -298,18 +322,19 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
 // Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
 template <int d>
 struct ContactSolver<d>::Trial {
-  explicit Trial(ContactSolver& owner) : solver(owner), steps(owner.options_.newton_steps) { solver.forget(); }
+  explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.forget(); }
   ~Trial() {
     solver.carries_ = false;
     solver.boldness_ = 1;
     solver.share_ = 0;
     solver.leash_ = 0;
-    solver.options_.newton_steps = steps;
+    solver.lean_ = 0;
+    solver.options_ = options;
     solver.forget();
   }
   Trial(const Trial&) = delete;
   ContactSolver& solver;
-  int steps;
+  ContactOptions options;
 };
 
 // Forces and rigid motions under which all points that can move are pressed and stick: where such a body is to come to
@@ -326,6 +351,7 @@ void ContactSolver<d>::glue(const ContactProblem<d>& problem, ContactSolution<d>
   system.topLeftCorner(n, n) = -compliance_(rows, rows);
   system.topRightCorner(n, m) = give_ * rigid_.motions(rows, Eigen::all);
   system.bottomLeftCorner(m, n) = rigid_.loads(rows, Eigen::all).transpose();
+  system.bottomRightCorner(m, m) = give_ * rigid_.inertia;
   right << -problem.free(rows), problem.rigid;
   for (Eigen::Index row = 0; row < n; row += d) {
     const auto i = static_cast<std::size_t>(rows[static_cast<std::size_t>(row)] / d);
@@ -343,7 +369,7 @@ void ContactSolver<d>::glue(const ContactProblem<d>& problem, ContactSolution<d>
   solution.rigid = found.tail(m);
 }
 
-// Newton from there, on a leash while nothing holds the body. It has a place where points hold it in the end.
+// Newton from there, on a leash while nothing holds the body.
 template <int d>
 bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
   double reach = problem.step * problem.free.cwiseAbs().maxCoeff();
@@ -351,8 +377,13 @@ bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_sear
   const Trial trial(*this);
   if (!line_search && reach > 0) leash_ = problem.step * problem.rigid.cwiseAbs().maxCoeff() / reach;
   glue(problem, solution);
-  if (!newton(problem, line_search, solution)) return false;
-  leash_ = 0;
+  return newton(problem, line_search, solution) && held(problem, solution);
+}
+
+// Whether a solution that was found with something else to hold the body is held by the points alone.
+template <int d>
+bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  leash_ = lean_ = 0;
   forget();
   factor(problem, linearise(problem, solution.added, solution.rigid), solution);
   return !solution.unsupported;
@@ -415,7 +446,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       solution.added = beyond_known(problem, pressed);
       return newton(problem, true, solution);
     });
-  if (rigid_.count() > 0 && !massive)  // it may have to come to the foundation first
+  if (rigid_.count() > 0)  // it may have to come to the foundation first
     for (const bool line_search : {true, false})
       attempt(Stage::restart, [&] { return approach(problem, line_search, solution); });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
@@ -429,7 +460,14 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       move();
       return newton(problem, true, solution);
     });
-  attempt(Stage::fixed_point, [&] { return fixed_point(problem, solution); });
+  attempt(Stage::fixed_point, [&] {
+    const Trial trial(*this);
+    const bool unsupported = solution.unsupported;
+    move();
+    if (fixed_point(problem, solution) && held(problem, solution)) return true;
+    solution.unsupported = unsupported || solution.unsupported;
+    return false;
+  });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   solution.unsupported = solution.unsupported && !solution.converged;
