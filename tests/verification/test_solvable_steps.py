@@ -181,6 +181,7 @@ def test_sharp_regularisation_at_gauss_points() -> None:
             },
         )
     )
+    assert set(job.stages) == {"newton"}
     posed = Posed(job)
     pressing, friction = posed.split(posed.force)
     w = posed.split(posed.velocity(posed.force))[1][:, 0]

@@ -63,9 +63,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
                  away = distance(law.compliance, lambda / point.weight, r);
     const double wrong = largest > 0 ? off / largest : unlimited;
-    double normal = off == 0 || away == 0 ? 0 : std::min(wrong, away / reach);
-    if (lambda < 0)
-      normal = std::min(normal, std::max(-lambda / largest, std::max(r, 0.0) / reach));  // open after both
+    const double normal = off == 0 || away == 0 ? 0 : std::min(wrong, away / reach);
     const double friction =
         friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
     if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
