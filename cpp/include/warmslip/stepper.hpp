@@ -172,7 +172,6 @@ class Stepper {
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
   VecHandle correction_strained_;                // the correction but for a rigid motion
-  VecHandle heating_error_;                      // heat that the error of the velocity makes, as estimated last
   Eigen::MatrixXd carried_;                      // velocities of the contact points in the rigid motions
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for rigid_ and constants_
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held

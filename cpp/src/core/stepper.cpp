@@ -62,7 +62,6 @@ void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<
 template <int d>
 void Stepper<d>::forget() {
   if (contact_) contact_->forget();
-  if (heating_error_) WARMSLIP_PETSC(VecSet(heating_error_, 0));
   if (rigid_.empty()) return;
   WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
   WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));

@@ -130,19 +130,7 @@ void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
 template <int d>
 void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
-  if (!apply) {
-    books_.add_rounding(heat_right_, heat_external_);
-    if (next_.heating_w) {
-      const auto measure = [&] {
-        multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heating_error_);
-      };
-      const bool lagged = options_.coupling == Coupling::lagged;
-      if (!lagged) measure();
-      for (const Vec v : {Vec(heat_right_), Vec(heat_external_)})
-        if (v) WARMSLIP_PETSC(VecAXPY(v, 1, heating_error_));
-      if (lagged) measure();
-    }
-  }
+  if (!apply) books_.add_rounding(heat_right_, heat_external_);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
@@ -188,8 +176,8 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   const bool wanted = measured_now(loads, contact);
   if (!wanted && !refined && !warmed) return ledger;
   const int before = substitutions();
-  if (momentum_) correct_motion(loads, ledger, contact, false);
-  if (heat_) correct_heat(inputs(loads, contact), ledger, false);
+  if (momentum_ && (refined || wanted)) correct_motion(loads, ledger, contact, false);
+  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return ledger;

@@ -140,7 +140,6 @@ void Stepper<d>::take_vectors() {
     for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout_.vector(1);
   if (!rigid_.empty())
     for (VecHandle* v : {&momentum_external_, &correction_strained_}) *v = layout_.vector(d);
-  if (next_.heating_w) heating_error_ = layout_.vector(1);
   if (!constants_.empty()) heat_external_ = layout_.vector(1);
   if (moves && conducts && options_.coupling == Coupling::monolithic)
     for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);
