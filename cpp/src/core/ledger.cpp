@@ -282,12 +282,10 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   enum { defect, backward, acting };
   std::array<double, 3> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double
-      theta = after.sizes.theta,
-      both = std::max(
-          theta, before.sizes.theta),  // a velocity that strains is known to the rounding of one that carries the body:
-                                       // a millionth is as far from it as round-off is from the bound on a balance
-      w = std::max(largest(in.coupling_w), 1e-6 * std::max(after.sizes.w, before.sizes.w));
+  const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = largest(in.coupling_w);
+  // a velocity that strains is known to the rounding of one that carries the body: a millionth is as far from it as
+  // round-off is from the bound on a balance
+  const double carried = std::max(0.0, 1e-6 * std::max(after.sizes.w, before.sizes.w) - w);
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
         c(contact_heat_), sizes(contact_heat_size_), values(after.theta), old(before.theta);
@@ -297,12 +295,13 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                    exchange = at(*x, i) + at(*c, i);
       const double external = storage + exchange - supply - heating, wall = external + (*flux)[i];
       const double given = std::abs(exchange) + std::abs(supply) + std::abs(heating);
-      const double magnitude = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
-                               theta * at(exchange_rows_, i) + at(*sizes, i) + w * at(heating_rows_, i);
+      const double terms = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
+                           theta * at(exchange_rows_, i) + at(*sizes, i) + w * at(heating_rows_, i),
+                   magnitude = terms + carried * at(heating_rows_, i);
       content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
-      heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude;
-      heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : magnitude - theta * conduction_rows_[i];
+      heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms;
+      heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
       if (cooled_[static_cast<std::size_t>(i)]) {
         l.held += in.k * wall * (*values)[i];
       } else {
