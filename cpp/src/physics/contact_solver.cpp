@@ -233,6 +233,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
   Linearisation at = linearise(problem, solution.added, solution.rigid);
   const Eigen::Index all = compliance_.rows();
   ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
+  std::vector<int> tried;   // statuses of the step before
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
     solution.force = total(problem, solution.added);
@@ -240,9 +241,11 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     const double unbalanced = rigid_.count() > 0 ? at.value.tail(rigid_.count()).cwiseAbs().maxCoeff() : 0;
     const double forces =
         rigid_.count() > 0 ? problem.rigid.cwiseAbs().maxCoeff() + solution.force.cwiseAbs().sum() : 0;
-    // a correction of what is known is wanted, however little it is, but not another solution of a law that has several
-    const bool wanted =
-        step == 0 && problem.known_force.size() > 0 && at.value.head(all).norm() <= 1e-6 * solution.force.norm();
+    // a correction of what is known is wanted, however little it is, with the statuses it leads to, but not another
+    // solution of a law that has several
+    const bool wanted = (step == 0 || (step < few_steps && at.key != tried)) && problem.known_force.size() > 0 &&
+                        at.value.head(all).norm() <= 1e-6 * solution.force.norm();
+    tried = at.key;
     if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
