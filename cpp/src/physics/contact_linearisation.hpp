@@ -35,4 +35,22 @@ struct ContactSolver<d>::Linearisation {
   std::vector<int> key;  // what the tangent depends on
 };
 
+// Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
+template <int d>
+struct ContactSolver<d>::Trial {
+  explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.forget(); }
+  ~Trial() {
+    solver.carries_ = false;
+    solver.boldness_ = 1;
+    solver.share_ = 0;
+    solver.leash_ = 0;
+    solver.lean_ = 0;
+    solver.options_ = options;
+    solver.forget();
+  }
+  Trial(const Trial&) = delete;
+  ContactSolver& solver;
+  ContactOptions options;
+};
+
 }  // namespace warmslip
