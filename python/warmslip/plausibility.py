@@ -160,6 +160,15 @@ def several(
     ]
 
 
+def unknown(coefficient: float, reason: str) -> list[str]:
+    """Of the largest friction coefficient, where no bound on it is known."""
+    return [
+        f"the friction coefficient is {coefficient:g}, and no value is known up to which every step has one solution, as "
+        f"{reason}: a step may have several, of which Newton's method takes the one it reaches from the forces of the "
+        "step before; compare with a run in steps of half the length"
+    ]
+
+
 def shares(coefficient: float) -> list[str]:
     """Of the largest friction coefficient, where points with friction share their normal forces."""
     return [

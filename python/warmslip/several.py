@@ -155,6 +155,8 @@ def sentences(d: Discretisation, stepper: Any, stages: dict[str, int]) -> list[s
     found = of_scene(d, stepper, enough=1.0)
     if found.shares:
         return say.shares(max(found.coefficients))
+    if found.reason:
+        return say.unknown(max(found.coefficients), found.reason)
     if not found.several:
         return []
     touching = np.asarray(stepper.status) > 0

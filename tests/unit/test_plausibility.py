@@ -289,6 +289,19 @@ def test_what_temperatures_the_data_allow(keys: dict[str, Any], allowed: tuple[f
     assert job.watch._allowed == pytest.approx(allowed)
 
 
+def test_where_no_bound_on_friction_is_known_the_run_says_so() -> None:
+    """Friction that depends on the slip speed, and a body without inertia that nothing but its contact holds."""
+    weak = body(PRESSED, contact__friction__kinetic=0.1, contact__friction__speed=0.5)
+    held = body(PRESSED, supports__displacement=[], inertia=None)
+    for scene, reason in (
+        (weak, "friction depends on the slip speed"),
+        (held, "nothing but its contact holds the body"),
+    ):
+        said = [one for one in warnings(scene) if "no value is known" in one]
+        assert len(said) == 1 and reason in said[0] and "compare with a run in steps of half the length" in said[0]
+    assert not any("no value is known" in one for one in warnings(body(PRESSED)))
+
+
 def test_heating_and_friction_leave_no_bound() -> None:
     warm = body(PRESSED, heat={"conductivity": 1.0, "capacity": 1.0}, initial={"temperature": 1.0})
     assert warmslip.Run(warm).watch._allowed == (1.0, 1.0)
@@ -322,6 +335,7 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
 
 LIBRARY = {
     **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
+    "brake_pad": ["the friction coefficient is 0.4, and no value is known up to which every step has one solution"],
     "block_with_hole": ["the largest strain is 23.3 %"],
     "creep_column": ["the body sinks into the foundation by 0.0882, 4.4 %"],
     "sliding_block": ["18 of 153 temperatures lie below 0"],
