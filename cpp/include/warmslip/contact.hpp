@@ -129,12 +129,12 @@ struct PointResidual {
   int slip_sign;  ///< d = 2: sign of the slip along the tangent
   bool touching;  ///< see NormalResidual
   bool pressed;   ///< lambda_nu > 0
-  bool apart;     ///< the residual is the force: by_force = 1, by_velocity = 0
+  bool away;      ///< no pressure acts: the normal residual is the normal force
   bool smooth;    ///< no friction acts: the tangential residual is the tangential force
 
   /// Of a piecewise linear law the derivative (d = 2) depends on this alone.
   int key() const {
-    return (smooth ? 100000 : 0) + (apart ? 10000 : 0) + (pressed ? 1000 : 0) + (touching ? 100 : 0) +
+    return (smooth ? 100000 : 0) + (away ? 10000 : 0) + (pressed ? 1000 : 0) + (touching ? 100 : 0) +
            static_cast<int>(status) * 10 + slip_sign;
   }
 };

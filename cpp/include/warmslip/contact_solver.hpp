@@ -87,7 +87,7 @@ class ContactSolver {
  private:
   struct Linearisation;
   struct Trial;
-  // A point in contact in the dense tangent: all components of its force, or the normal one where no friction acts.
+  // A point in the dense tangent, with as many components of its force as are not known to be 0.
   struct Closed {
     using Basis = Eigen::Matrix<double, d, Eigen::Dynamic, Eigen::ColMajor, d, d>;
     Eigen::Index row, at;  // its first component among all, and in the tangent

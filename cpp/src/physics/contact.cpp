@@ -128,7 +128,8 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   PointResidual<d> out;
   out.touching = across.touching;
   out.pressed = lambda > 0;
-  out.apart = out.smooth = false;
+  out.away = !out.touching && across.by_force == 1 && across.by_penetration == 0;
+  out.smooth = false;
   out.value = across.value * nu;
   out.by_force = across.by_force * normal;
   out.by_velocity = k * across.by_penetration * normal;
@@ -139,7 +140,6 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   if (bound <= 0 || (!out.touching && law.friction.cohesion <= 0 && !law.friction.custom)) {  // no friction
     out.status = out.touching ? Status::slip : Status::open;
     out.smooth = true;
-    out.apart = !out.touching && across.by_force == 1 && across.by_penetration == 0;
     out.value += tangential * force;
     out.by_force += tangential;
   } else if (!smooth && size <= bound) {

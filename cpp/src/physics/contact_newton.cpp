@@ -6,6 +6,17 @@
 namespace warmslip {
 namespace {
 
+// An orthonormal basis of the force of a point that Newton's method seeks; the rest of it is known to be 0.
+template <int d>
+Eigen::Matrix<double, d, Eigen::Dynamic, Eigen::ColMajor, d, d> sought(const PointResidual<d>& at, const Point<d>& nu) {
+  if (!at.away && !at.smooth) return Tensor2<d>::Identity();
+  if (at.smooth) return nu;
+  Eigen::Matrix<double, d, d - 1> across;
+  across.col(0) = nu.unitOrthogonal();
+  if constexpr (d == 3) across.col(1) = nu.cross(across.col(0));
+  return across;
+}
+
 constexpr int patience = 15;  // steps in which a small correction may change statuses
 
 // Eigen's estimate alone is any number where a pivot is 0 exactly.
@@ -53,8 +64,7 @@ void ContactSolver<d>::prescribed(const ContactProblem<d>& problem, Linearisatio
   out.by_force = Tensor2<d>::Identity();
   out.by_velocity.setZero();
   out.status = bound <= 0 && r <= 0 ? Status::open : speed > 0 ? Status::slip : Status::stick;
-  out.apart = true;
-  out.smooth = false;
+  out.away = out.smooth = true;
   at.value.template segment<d>(row) = out.value;
 }
 
@@ -112,10 +122,8 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   closed_.clear();
   Eigen::Index n = 0;
   for (std::size_t i = 0; i < at.points.size(); ++i) {
-    if (at.points[i].apart) continue;
-    using Basis = typename Closed::Basis;
-    closed_.push_back({static_cast<Eigen::Index>(i) * d, n,
-                       at.points[i].smooth ? Basis(problem.points[i].normal) : Basis(Tensor2<d>::Identity())});
+    if (at.points[i].away && at.points[i].smooth) continue;
+    closed_.push_back({static_cast<Eigen::Index>(i) * d, n, sought<d>(at.points[i], problem.points[i].normal)});
     n += closed_.back().size();
   }
   const Eigen::Index m = rigid_.count();
@@ -173,9 +181,10 @@ Tensor2<d> ContactSolver<d>::shared(const ContactProblem<d>& problem, const Poin
   return out;
 }
 
-// The Newton direction of forces and rigid motions: points apart take their force at once, as does the tangential force
-// of one without friction; the others share a dense system. A body that nothing else holds would else slide by rounding
-// of a tangential force.
+// The Newton direction of forces and rigid motions: what is known to be 0 of a force, the pressure of a point that is
+// away and the tangential force of one without friction, becomes so at once; the rest shares a dense system. A body
+// that nothing else holds would else slide by rounding of a tangential force, and a pressure of rounding be taken for
+// contact.
 template <int d>
 Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
   const Eigen::Index m = rigid_.count(), all = compliance_.rows(), n = tangent_.rows() - m;
