@@ -133,9 +133,13 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   };
   for (const Closed& row : closed_) {
     const PointResidual<d>& point = at.points[static_cast<std::size_t>(row.row / d)];
-    for (const Closed& column : closed_)
-      at_block(row, column) = -(row.basis.transpose() * point.by_velocity) *
-                              (compliance_.template block<d, d>(row.row, column.row) * column.basis);
+    for (const Closed& column : closed_) {
+      const auto give = compliance_.template block<d, d>(row.row, column.row);
+      if (row.size() == d && column.size() == d)  // of fixed sizes, and quick
+        tangent.template block<d, d>(row.at, column.at).noalias() = -point.by_velocity * give;
+      else
+        at_block(row, column) = -(row.basis.transpose() * point.by_velocity) * (give * column.basis);
+    }
     at_block(row, row) += row.basis.transpose() * (point.by_force + shared(problem, point, row.row / d)) * row.basis;
     for (Eigen::Index j = 0; j < m; ++j) {
       const Point<d> motion = rigid_.motions.col(j).template segment<d>(row.row),
