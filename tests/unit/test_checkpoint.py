@@ -85,6 +85,19 @@ def test_a_resumed_run_ends_the_same(tmp_path: Path, more: tuple[str, ...], step
     assert not any((tmp_path / "torn" / name).exists() for name in checkpoint.NAMES)
 
 
+def test_a_resumed_run_knows_the_largest_values_so_far(tmp_path: Path) -> None:
+    """Errors are relative to them: the digits of what has died away would else be fewer."""
+    whole = Run(scene())
+    for state, _ in whole.steps():
+        if state.step == 5:
+            break
+    with pytest.raises(KilledError):
+        warmslip.run(scene(), out=tmp_path, progress=stop_after(7))
+    again = Run(scene())
+    assert again.resume(tmp_path) == 5
+    assert again.stepper.scales == whole.stepper.scales and min(again.stepper.scales) > 0
+
+
 def test_a_torn_checkpoint_is_passed_over_for_the_one_before(tmp_path: Path) -> None:
     with pytest.raises(KilledError):
         warmslip.run(scene(), out=tmp_path, progress=stop_after(13))

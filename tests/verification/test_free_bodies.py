@@ -103,6 +103,27 @@ def warm_and_held_by_contact(d: int) -> None:
 
 
 @check
+def strongly_coupled_and_unsymmetric(d: int) -> None:
+    """Steps about as long as the waves' transit, in which mass and springs hold the motions alike: momentum stays."""
+    strong = (1e3 * np.array(turned(d))).tolist()
+    for end in (1e-6, 1e-5, 1e-4):
+        job = right(
+            steel(
+                d,
+                3,
+                end,
+                heat=heated(d, strong, source=f"{1e-4 / end} * x * y", expansion={"tensor": 2e3}),
+                loads={"body": along(d, -1.0)},
+                contact={"part": "bottom", "stiffness": 1e6, "gap": 1.0, "friction": {"coefficient": 0.2}},
+            )
+        )
+        pushed = 10.0**d * end
+        assert momentum(job)[-1] == pytest.approx(-pushed, rel=1e-10)
+        assert np.abs(momentum(job)[:-1]).max() <= 1e-10 * pushed
+        assert job.stepper.cost.refinements == 0  # which would mend motions of the wrong operator
+
+
+@check
 def slides_without_friction(d: int) -> None:
     """Nothing resists a motion along the foundation: the speed stays, however long the steps and heavy the load."""
     for n in (3, 6) if d == 2 else (2, 3):
