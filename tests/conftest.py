@@ -50,7 +50,7 @@ def _command(tmp_path: Path) -> Command:
             text=True,
             capture_output=True,
             check=False,
-            timeout=120,
+            timeout=300,
         )
 
     return call
