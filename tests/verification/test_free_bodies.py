@@ -160,7 +160,8 @@ def flight_makes_no_heat(d: int) -> None:
                         initial={"velocity": velocity},
                     )
                     theta = np.abs(field(right(one, digits=4.0), "theta")).max()
-                    assert theta <= 1e-12 * 1e3 * end / capacity, (coupling, end, capacity, theta)
+                    # 1e-10 of what a strain rate of 1 would heat: below, the core takes a temperature for rounding
+                    assert theta <= 1e-10 * 1e3 * end / capacity, (coupling, end, capacity, theta)
 
 
 def dense(operator: Any) -> Any:
