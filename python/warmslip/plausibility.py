@@ -160,10 +160,13 @@ def several(
     ]
 
 
-def unknown(coefficient: float, reason: str) -> list[str]:
-    """Of the largest friction coefficient, where no bound on it is known."""
+def unknown(coefficient: float | None, reason: str) -> list[str]:
+    """Of the largest friction coefficient, None for a law of one's own alone, where no bound on it is known."""
+    size = (
+        "the friction is a law of your own" if coefficient is None else f"the friction coefficient is {coefficient:g}"
+    )
     return [
-        f"the friction coefficient is {coefficient:g}, and no value is known up to which every step has one solution, as "
+        f"{size}, and no value of a coefficient is known up to which every step has one solution, as "
         f"{reason}: a step may have several, of which Newton's method takes the one it reaches from the forces of the "
         "step before; compare with a run in steps of half the length"
     ]

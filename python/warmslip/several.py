@@ -127,10 +127,14 @@ def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touch
         c.friction is None or not (c.friction.limit or c.friction.regularisation or c.friction.cohesion)
         for c in contacts
     )
+    shared = Finding(coefficients, 0.0, reason="its contact points share their forces in many ways", shares=True)
     if shares_friction(points):
-        return Finding(coefficients, 0.0, reason="its contact points share their forces in many ways", shares=True)
+        return shared
     if d.dim == 2 and straight and simple and len(points.weights) <= POINTS:
-        return Finding(coefficients, exact(points), sharp=True)
+        try:
+            return Finding(coefficients, exact(points), sharp=True)
+        except np.linalg.LinAlgError:  # singular by a rounding more than `shares_friction` looks for
+            return shared
     return Finding(coefficients, bound(points, enough=enough))
 
 
@@ -156,7 +160,7 @@ def sentences(d: Discretisation, stepper: Any, stages: dict[str, int]) -> list[s
     if found.shares:
         return say.shares(max(found.coefficients))
     if found.reason:
-        return say.unknown(max(found.coefficients), found.reason)
+        return say.unknown(max(found.coefficients, default=None), found.reason)
     if not found.several:
         return []
     touching = np.asarray(stepper.status) > 0

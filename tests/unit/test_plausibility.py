@@ -297,9 +297,29 @@ def test_where_no_bound_on_friction_is_known_the_run_says_so() -> None:
         (weak, "friction depends on the slip speed"),
         (held, "nothing but its contact holds the body"),
     ):
-        said = [one for one in warnings(scene) if "no value is known" in one]
+        said = [one for one in warnings(scene) if "no value of a coefficient is known" in one]
         assert len(said) == 1 and reason in said[0] and "compare with a run in steps of half the length" in said[0]
-    assert not any("no value is known" in one for one in warnings(body(PRESSED)))
+    assert not any("no value of a coefficient is known" in one for one in warnings(body(PRESSED)))
+
+
+@pytest.mark.parametrize("friction", [{"coefficient": 0.3}, None])
+def test_a_friction_law_of_ones_own_has_no_bound(friction: Any) -> None:
+    """With and without a coefficient in the scene, which the law takes the place of."""
+    scene = body(PRESSED, contact={"part": "bottom", "stiffness": 1e4} | ({"friction": friction} if friction else {}))
+    law = warmslip.Law(friction=lambda p, v: (0.2 * p, 0.2 + 0 * p, 0 * v))
+    done = warmslip.run(scene, laws={"bottom": law})
+    said = [one for one in done.summary["warnings"] if "no value of a coefficient is known" in one]
+    assert done.right and len(said) == 1 and said[0].startswith("the friction ")
+
+
+def test_a_singular_compliance_is_a_share_of_forces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `exact` cannot divide by is said like the shares that are found before."""
+
+    def fails(points: Any) -> float:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("warmslip.several.exact", fails)
+    assert any("share their normal forces in many ways" in one for one in warnings(body(PRESSED, mesh__n=2)))
 
 
 def test_heating_and_friction_leave_no_bound() -> None:
@@ -335,7 +355,9 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
 
 LIBRARY = {
     **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
-    "brake_pad": ["the friction coefficient is 0.4, and no value is known up to which every step has one solution"],
+    "brake_pad": [
+        "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution"
+    ],
     "block_with_hole": ["the largest strain is 23.3 %"],
     "creep_column": ["the body sinks into the foundation by 0.0882, 4.4 %"],
     "sliding_block": ["18 of 153 temperatures lie below 0"],
