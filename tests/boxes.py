@@ -7,8 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import Run, Scene, discretise
+from warmslip import Run, Scene, _core, discretise
+from warmslip.materials import make_mesh
 from warmslip.scene import build
+from warmslip.tables import PARTS
+
+SIDES = {2: PARTS["square"], 3: PARTS["cube"]}
+FAR = ("right", "top", "back")  # at the far end of their axis
 
 
 def elasticity(d: int, young: float, poisson: float) -> dict[str, Any]:
@@ -22,6 +27,20 @@ def body(d: int, n: Any, length: float = 1.0) -> dict[str, Any]:
 def scene(d: int, n: Any, **tables: Any) -> Scene:
     length = tables.pop("length", 1.0)
     return build({"mesh": body(d, n, length), "time": {"steps": 4}} | tables)
+
+
+def axis_of(d: int, part: str) -> int:
+    return {"left": 0, "right": 0, "front": 1, "back": 1}.get(part, d - 1)
+
+
+def turned(one: Scene, turn: Any) -> tuple[Scene, Any]:
+    """The scene and its mesh about the origin; `turn` (d, d) is orthonormal. Its body force is a vector of numbers."""
+    mesh = make_mesh(one)
+    kind = getattr(_core, f"Mesh{len(turn)}")
+    parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
+    assert one.loads is not None
+    load = (turn @ np.array(one.loads.body)).tolist()
+    return one.override(**{"loads.body": load}), kind.from_lists(np.array(mesh.nodes) @ turn.T, mesh.cells, parts)
 
 
 def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
@@ -50,7 +69,7 @@ def fields(job: Run) -> dict[str, Any]:
     """What the run has of u, w and theta in mesh numbering, and its contact forces (points, d)."""
     found = {name: field(job, name) for name in ("u", "w", "theta")}
     if len(job.stepper.contact_force):
-        found["contact force"] = np.reshape(job.stepper.contact_force, (-1, job.discretisation.dim))
+        found["contact force"] = forces_of(job)
     return {name: value for name, value in found.items() if value is not None}
 
 

@@ -6,7 +6,9 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import pytest
 from conftest import child_environment
 
 Check = Callable[[int], None]
@@ -34,6 +36,21 @@ class Checks:
         for name in self.names:
             self.run(name, int(sys.argv[1]))
         print(self.verdict, flush=True)
+
+    def tests(self, file: str) -> tuple[Any, Any]:
+        """Two functions for pytest: every check on one rank, and all of them together, the program `file`, on two."""
+
+        @pytest.mark.parametrize("d", [2, 3])
+        @pytest.mark.parametrize("name", self.names)
+        def on_one(name: str, d: int) -> None:
+            self.run(name, d)
+
+        @pytest.mark.mpi
+        @pytest.mark.parametrize("d", [2, 3])
+        def on_two(d: int) -> None:
+            on_two_ranks(file, d, self)
+
+        return on_one, on_two
 
     @property
     def verdict(self) -> str:

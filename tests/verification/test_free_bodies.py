@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from boxes import along, elasticity, field, right, scene
-from ranked import Checks, on_two_ranks
+from ranked import Checks
 
 from warmslip import Run, Scene
 
@@ -208,16 +208,7 @@ def test_an_indefinite_coupling_is_refused_and_no_other(density: float) -> None:
         Run(coupled(limit * (1 + 1e-6)))
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", check.names)
-def test_free_bodies(name: str, d: int) -> None:
-    check.run(name, d)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("d", [2, 3])
-def test_free_bodies_on_two_ranks(d: int) -> None:
-    on_two_ranks(__file__, d, check)
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
 if __name__ == "__main__":

@@ -9,23 +9,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from boxes import elasticity, field, right, scene
-from ranked import Checks, on_two_ranks
+from boxes import FAR, SIDES, along, axis_of, elasticity, field, right, scene, turned
+from ranked import Checks
 
 import warmslip
 from warmslip import Run, _core, discretise
 from warmslip.materials import make_mesh
 
-SIDES = {2: ("left", "right", "bottom", "top"), 3: ("left", "right", "front", "back", "bottom", "top")}
-AXES = {"left": 0, "right": 0, "front": 1, "back": 1}
 check = Checks()
 
 
 def held(d: int, part: str, by: str, inside: Any, **contact: Any) -> Any:
     """A body, pressed on `part`, whose support `by` moves towards it by `inside`."""
-    axis = AXES.get(part, d - 1)
+    axis = axis_of(d, part)
     move: list[Any] = [0.0] * d
-    out = 1 if part in ("right", "top", "back") else -1
+    out = 1 if part in FAR else -1
     load = [0.0] * d
     load[axis] = 0.1 * out
     move[axis] = f"{out} * ({inside})" if isinstance(inside, str) else out * inside
@@ -41,7 +39,7 @@ def held(d: int, part: str, by: str, inside: Any, **contact: Any) -> Any:
 
 def beside(d: int, part: str) -> list[str]:
     """The parts that share an edge with a part."""
-    return [by for by in SIDES[d] if AXES.get(by, d - 1) != AXES.get(part, d - 1)]
+    return [by for by in SIDES[d] if axis_of(d, by) != axis_of(d, part)]
 
 
 @check
@@ -109,16 +107,46 @@ def gauss_points_count_where_all_their_nodes_are_held(d: int) -> None:
     right(held(d, "bottom", "left", 0.02, gap=0.005, quadrature=rule))  # the edge alone is held
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", check.names)
-def test_on_one_rank(name: str, d: int) -> None:
-    check.run(name, d)
+@check
+def a_wall_beside_its_support(d: int) -> None:
+    """A held node lies on its rigid foundation to the rounding of its normal and of the solve, and is not inside."""
+    for mu in (0.0, 0.3):
+        rigid = {"stiffness": "rigid", "friction": {"coefficient": mu}}
+        one = scene(
+            d,
+            [1] * (d - 1) + [2],
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.3),
+            supports={"displacement": ["top"]},
+            loads={"body": along(d, -1e-3)},
+            contact={"part": "left"} | rigid,
+        )
+        right(one)
+        level = right(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}))
+        for angle in (0.3, 1.0):
+            turn = np.eye(d)
+            turn[np.ix_([0, -1], [0, -1])] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+            again, mesh = turned(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}), turn)
+            job = right(again, mesh=mesh)
+            assert job.report.normal_force == pytest.approx(level.report.normal_force, rel=1e-9)
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize("d", [2, 3])
-def test_on_two_ranks(d: int) -> None:
-    on_two_ranks(__file__, d, check)
+@check
+def a_support_that_meets_its_foundation_to_one_rounding(d: int) -> None:
+    """0.1 + 0.2 is more than 0.3 by 6e-17: nothing presses, and nothing is wrong."""
+    for quadrature in ("nodal", "gauss-2"):
+        one = scene(
+            d,
+            1,
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.3),
+            supports={"displacement": {"top": along(d, "-(0.1 + 0.2)")}},
+            contact={"part": "bottom", "stiffness": "rigid", "gap": 0.3, "quadrature": quadrature},
+        )
+        assert right(one, digits=4.0).report.normal_force <= 1e-15
+
+
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
 if __name__ == "__main__":

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from boxes import along, elasticity, field, right, scene
-from ranked import Checks, on_two_ranks
+from boxes import along, elasticity, field, forces_of, right, scene
+from ranked import Checks
 
 from warmslip import Run
 
@@ -21,11 +21,6 @@ STEEL: dict[str, Any] = {"young": 2.1e11, "poisson": 0.3}
 def bottom(job: Run) -> Any:
     """Which nodes lie at the bottom, (nodes)."""
     return np.asarray(job.discretisation.mesh.nodes)[:, -1] == 0
-
-
-def forces(job: Run, d: int) -> Any:
-    """Contact forces, (points, d)."""
-    return np.reshape(job.stepper.contact_force, (-1, d))
 
 
 # ---- depths ----------------------------------------------------------------------------------------------------------
@@ -56,7 +51,7 @@ def depths_far_below_the_free_motion(d: int) -> None:
             digits=12.0,
         )
         depth = -field(job, "u")[bottom(job), -1]
-        pressure = -forces(job, d)[:, -1] / np.asarray(job.discretisation.surface.weights)
+        pressure = -forces_of(job)[:, -1] / np.asarray(job.discretisation.surface.weights)
         assert pressure.min() > 1e3 and depth == pytest.approx(pressure / 1e24, rel=1e-12)
 
 
@@ -192,7 +187,7 @@ def regularised_friction_of_any_sharpness(d: int) -> None:
             )
         )
         assert set(job.stages) == {"newton"} and job.newton_max <= 6
-        answers[sharpness] = forces(job, d)
+        answers[sharpness] = forces_of(job)
     exact = answers.pop(0.0)
     miss = {e: np.abs(found - exact).max() / np.abs(exact).max() for e, found in answers.items()}
     assert miss[1e-5] / miss[1e-6] == pytest.approx(10, rel=0.1) and miss[1e-12] <= 1e-9
@@ -217,7 +212,7 @@ def gauss_points_on_a_rigid_foundation(d: int) -> None:
                 )
             )
             if supports is None and friction:  # it rests
-                assert -forces(job, d).sum(axis=0)[-1] == pytest.approx(1.0, rel=0.05)
+                assert -forces_of(job).sum(axis=0)[-1] == pytest.approx(1.0, rel=0.05)
 
 
 @check
@@ -235,8 +230,37 @@ def shares_beside_a_clamped_edge(d: int) -> None:
     other = Run(one, backend="petsc")
     for _ in other.steps():
         pass
-    found, again = forces(right(one), d), forces(other, d)
+    found, again = forces_of(right(one)), forces_of(other)
     assert np.abs(found[:, 0]).max() > 1e-4 and np.abs(found - again).max() <= 1e-12 * np.abs(found).max()
+
+
+@check
+def shares_of_as_many_points_as_nodes(d: int) -> None:
+    """One brick beside its support: the node that moves has more points than it needs, and their least share is N f / sum N^2."""
+    one = scene(
+        d,
+        1,
+        time={"steps": 1},
+        elasticity=elasticity(d, 1.0, 0.3),
+        supports={"displacement": ["right"]},
+        loads={"body": along(d, -1e-3)},
+        contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-2"},
+    )
+    job = right(one)
+    surface = job.discretisation.surface
+    found = -forces_of(job)[:, -1]
+    nodes, places = np.asarray(job.discretisation.mesh.nodes), np.asarray(surface.positions)
+    shape = np.zeros((len(places), len(nodes)))
+    for facet in np.asarray(job.discretisation.mesh.parts["bottom"]):  # barycentric coordinates where they are positive
+        corners = np.vstack([nodes[facet, :-1].T, np.ones(d)])
+        inside = np.linalg.solve(corners, np.vstack([places[:, :-1].T, np.ones(len(places))])).T
+        own = inside.min(axis=1) > 0
+        shape[np.ix_(own, facet)] = inside[own]
+    shape = shape[:, (nodes[:, 0] == 0) & (shape.sum(axis=0) > 0)]  # of the nodes that move
+    weights = np.asarray(surface.weights)
+    nodal = shape.T @ found
+    least = weights * (shape @ np.linalg.solve(shape.T @ (weights[:, None] * shape), nodal))
+    assert least.min() > 0 and np.abs(found - least).max() <= 1e-13 * least.max()
 
 
 @check
@@ -254,7 +278,7 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
         job, other = right(one), Run(one, backend="petsc")
         for _ in other.steps():
             pass
-        found, again = forces(job, d), forces(other, d)
+        found, again = forces_of(job), forces_of(other)
         assert np.abs(found - again).max() <= 1e-11 * np.abs(found).max()
         traction = found / np.asarray(job.discretisation.surface.weights)[:, None]
         pressing = -traction[:, -1]
@@ -270,16 +294,7 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
         assert np.abs(linear[bears] @ nodal - pressing[bears]).max() <= 1e-9 * pressing.max()
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", check.names)
-def test_remainders(name: str, d: int) -> None:
-    check.run(name, d)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("d", [2, 3])
-def test_remainders_on_two_ranks(d: int) -> None:
-    on_two_ranks(__file__, d, check)
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
 if __name__ == "__main__":

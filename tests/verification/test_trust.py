@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from boxes import along, elasticity, field, right, scene
-from ranked import Checks, on_two_ranks
+from ranked import Checks
 
 import warmslip
 from warmslip import Run
@@ -349,16 +349,7 @@ def contact_solver_does_not_give_up(d: int) -> None:
                     right(one)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", check.names)
-def test_trust(name: str, d: int) -> None:
-    check.run(name, d)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("d", [2, 3])
-def test_trust_on_two_ranks(d: int) -> None:
-    on_two_ranks(__file__, d, check)
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
 if __name__ == "__main__":

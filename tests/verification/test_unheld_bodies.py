@@ -10,21 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from boxes import elasticity, right, scene
-from ranked import Checks, on_two_ranks
+from boxes import FAR, SIDES, axis_of, elasticity, right, scene, turned
+from ranked import Checks
 
-from warmslip import Run, _core, discretise
-from warmslip.materials import make_mesh
+from warmslip import Run, discretise
 
-PARTS = {2: {"left": 0, "right": 0, "bottom": 1, "top": 1}}
-PARTS[3] = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
-FAR = ("right", "top", "back")
 check = Checks()
 
 
 def inwards(d: int, part: str, along: float = 0.0) -> list[float]:
     """A unit of load that presses on a part, and some along the next axis."""
-    axis = PARTS[d][part]
+    axis = axis_of(d, part)
     load = [0.0] * d
     load[axis] = 1.0 if part in FAR else -1.0
     load[(axis + 1) % d] = along
@@ -41,15 +37,6 @@ def free(d: int, part: str, load: Any, mu: float = 0.5, n: int = 2, **contact: A
         loads={"body": load},
         contact={"part": part, "stiffness": 1e5} | friction | contact,
     )
-
-
-def turned(one: Any, turn: Any) -> Any:
-    """The scene and its mesh about the origin; `turn` (d, d) is orthonormal."""
-    mesh = make_mesh(one)
-    kind = getattr(_core, f"Mesh{len(turn)}")
-    parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
-    body = (turn @ np.array(one.loads.body)).tolist()
-    return one.override(**{"loads.body": body}), kind.from_lists(np.array(mesh.nodes) @ turn.T, mesh.cells, parts)
 
 
 def outcome(one: Any, mesh: Any = None) -> str:
@@ -72,7 +59,7 @@ def unheld(d: int, part: str) -> Iterator[Any]:
 
 @check
 def what_nothing_holds_is_refused_on_every_part(d: int) -> None:
-    for part in PARTS[d]:
+    for part in SIDES[d]:
         assert {outcome(one) for one in unheld(d, part)} == {"unsupported"}, part
 
 
@@ -80,14 +67,15 @@ def what_nothing_holds_is_refused_on_every_part(d: int) -> None:
 def and_whichever_way_it_is_turned(d: int) -> None:
     turn = np.linalg.qr(np.random.default_rng(d).normal(size=(d, d)))[0]
     turn[0] *= np.sign(np.linalg.det(turn))
-    for part in PARTS[d]:
+    for part in SIDES[d]:
         assert {outcome(*turned(one, turn)) for one in unheld(d, part)} == {"unsupported"}, part
 
 
 @check
 def it_comes_to_its_foundation(d: int) -> None:
     """A gap that a rigid motion closes, of 1 % or of fifty bodies, leaves the forces that there are without one."""
-    for part, axis in PARTS[d].items():
+    for part in SIDES[d]:
+        axis = axis_of(d, part)
         load = inwards(d, part, 0.1)
         across = "yx"[axis] if d == 2 else "yzx"[axis]
         slope = f"0.01 + 0.02 * {across}" if part not in FAR else 0.02  # beyond the origin a turn slides, too
@@ -123,16 +111,7 @@ def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
     assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("name", check.names)
-def test_on_one_rank(name: str, d: int) -> None:
-    check.run(name, d)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("d", [2, 3])
-def test_on_two_ranks(d: int) -> None:
-    on_two_ranks(__file__, d, check)
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,8 @@ class ContactSurface {
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
   /// Without the nodes whose displacement is prescribed: forces there move nothing.
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& moving_shape() const { return moving_shape_; }
+  /// Whether forces of the points that move can be shared so that they move nothing.
+  bool shares() const { return shares_; }
 
  private:
   const Layout<d>& layout_;
@@ -60,6 +62,7 @@ class ContactSurface {
   std::vector<std::size_t> contacts_;
   std::vector<bool> prescribed_;
   std::vector<Eigen::Index> own_nodes_;
+  bool shares_ = false;
   Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
   Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_, moving_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)

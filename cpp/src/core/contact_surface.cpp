@@ -1,5 +1,7 @@
 #include "warmslip/contact_surface.hpp"
 
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseQR>
 #include <algorithm>
 #include <set>
 
@@ -16,6 +18,16 @@ std::set<Index> nodes_of(const Mesh<d>& mesh, const std::vector<std::string>& pa
     nodes.insert(facets.nodes.data(), facets.nodes.data() + facets.nodes.size());
   }
   return nodes;
+}
+
+// Whether rows of a matrix that are not zero depend on each other.
+bool dependent(const Eigen::SparseMatrix<double, Eigen::RowMajor>& rows) {
+  Eigen::Index some = 0;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) some += rows.row(i).nonZeros() > 0;
+  if (some > rows.cols() || some == 0) return some > 0;
+  Eigen::SparseMatrix<double> columns = rows.transpose();
+  columns.makeCompressed();
+  return Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>>(columns).rank() < some;
 }
 
 }  // namespace
@@ -100,6 +112,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
 
   moving_shape_ = scalar_shape_;
   moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return free_[node * d] != 0; });
+
+  shares_ = dependent(moving_shape_);
 
   std::vector<int> touched(static_cast<std::size_t>(nodes()), 0);  // points that a node moves
   for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];

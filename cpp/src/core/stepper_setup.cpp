@@ -101,8 +101,8 @@ void Stepper<d>::take_factors() {
   }
   if (surface_.points() == 0) return;
   ContactOptions contact = options_.contact;
-  // more contact points than nodes: forces are shared in many ways, see ContactSolver::factor and share_least
-  if (surface_.points() > surface_.nodes()) contact.proximal = 1e-6;
+  // forces are shared in many ways, see ContactSolver::shared and share_least
+  if (surface_.shares()) contact.proximal = 1e-6;
   RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), {}, rigid_.inertia()};
   apart.loads = carried_ = apart.motions;
   for (Eigen::Index j = 0; j < rigid_.count(); ++j) {

@@ -133,7 +133,7 @@ template <int d>
 bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
   solution = contact_->solve(posed_, guess);
-  if (solution.converged && surface_.points() > surface_.nodes())
+  if (solution.converged && surface_.shares())
     share_least(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());

@@ -53,9 +53,13 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
     const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
     const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
+    if (point.prescribed && law.compliance.rigid()) {  // it bears no pressure, and may be in by rounding alone
+      const double own = point.displacement.norm() + std::abs(point.gap) + problem.step * w.norm();
+      if (r > 0) worst = std::max(worst, r / std::max(reach, own));
+    }
     if (point.prescribed) {  // its force is computed from its motion alone
       const double size = std::max(f.norm(), bound),
-                   error = std::abs(lambda - point.weight * law.compliance.pressure(r));
+                   error = std::abs(lambda - (law.compliance.rigid() ? 0 : point.weight * law.compliance.pressure(r)));
       if (!std::isfinite(error)) return unlimited;
       if (size > 0) worst = std::max({worst, error / size, (f_tau.norm() - bound) / size});
       continue;
