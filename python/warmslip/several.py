@@ -10,9 +10,10 @@ import numpy as np
 
 from warmslip import plausibility as say
 from warmslip.loads import Array
+from warmslip.pieces import POINTS, exact
 from warmslip.problem import Discretisation
 from warmslip.tables import ContactTable
-from warmslip.uniqueness import POINTS, ContactPoints, bound, exact, shares_friction
+from warmslip.uniqueness import ContactPoints, bound, shares_friction
 
 
 @dataclass(frozen=True)

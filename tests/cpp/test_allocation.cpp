@@ -210,7 +210,7 @@ TEST_CASE_TEMPLATE("a step whose k-th allocation fails is taken later as if noth
 }
 
 TEST_CASE_TEMPLATE("a problem whose k-th allocation fails leaves nothing behind", D, Two, Three) {
-  check_setup<D::value>(300, true);
+  check_setup<D::value>(1000, true);
 }
 
 TEST_CASE_TEMPLATE("a problem in which PETSc's k-th allocation fails ends in an exception", D, Two, Three) {

@@ -10,8 +10,9 @@ import pytest
 from statuses import Step, random_step, velocities
 
 from warmslip import Run, Scene, several
+from warmslip.pieces import exact, solutions
 from warmslip.scene import build
-from warmslip.uniqueness import ContactPoints, bound, exact, shares_friction, solutions
+from warmslip.uniqueness import ContactPoints, bound, shares_friction
 
 
 def part(name: str, quadrature: str = "nodal", stiffness: Any = 1e3, mu: float = 0.5) -> dict[str, Any]:

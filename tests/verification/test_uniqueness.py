@@ -18,9 +18,10 @@ import pytest
 
 import warmslip
 from warmslip import Run, Scene, estimate, plausibility, several
+from warmslip.pieces import Solution, exact, solutions
 from warmslip.problem import discretise
 from warmslip.scene import build, load
-from warmslip.uniqueness import ContactPoints, Solution, bound, exact, solutions
+from warmslip.uniqueness import ContactPoints, bound
 
 Array = Any
 MOST = 8  # points whose statuses are all looked at

@@ -1,8 +1,8 @@
 #include "warmslip/contact_surface.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseQR>
+#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "warmslip/quadrature.hpp"
@@ -20,14 +20,23 @@ std::set<Index> nodes_of(const Mesh<d>& mesh, const std::vector<std::string>& pa
   return nodes;
 }
 
-// Whether rows of a matrix that are not zero depend on each other.
+// Whether rows of a matrix that are not zero depend on each other. A pivot of their products, relative to its diagonal,
+// is the squared sine of the angle between a row and those eliminated before it. Eigen's SparseQR would do as well, but
+// it writes to memory that it did not get (SparseMatrix::uncompress).
 bool dependent(const Eigen::SparseMatrix<double, Eigen::RowMajor>& rows) {
+  constexpr double nothing = 1e-10;
+  const Eigen::VectorXd sizes = rows.cwiseProduct(rows) * Eigen::VectorXd::Ones(rows.cols());
+  std::vector<Eigen::Triplet<double>> chosen;
   Eigen::Index some = 0;
-  for (Eigen::Index i = 0; i < rows.rows(); ++i) some += rows.row(i).nonZeros() > 0;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    if (sizes[i] > 0) chosen.emplace_back(some++, i, 1 / std::sqrt(sizes[i]));
   if (some > rows.cols() || some == 0) return some > 0;
-  Eigen::SparseMatrix<double> columns = rows.transpose();
-  columns.makeCompressed();
-  return Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>>(columns).rank() < some;
+  Eigen::SparseMatrix<double> unit(some, rows.rows());
+  unit.setFromTriplets(chosen.begin(), chosen.end());
+  const Eigen::SparseMatrix<double> scaled = unit * Eigen::SparseMatrix<double>(rows);
+  const Eigen::SparseMatrix<double> products = scaled * Eigen::SparseMatrix<double>(scaled.transpose());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> pivots(products);
+  return pivots.info() != Eigen::Success || !(pivots.vectorD().minCoeff() > nothing);
 }
 
 }  // namespace
