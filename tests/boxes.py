@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import Run, Scene, _core, discretise
+from warmslip import Run, Scene, _core, discretise, summary
 from warmslip.materials import make_mesh
 from warmslip.scene import build
 from warmslip.tables import PARTS
@@ -49,14 +49,17 @@ def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
 
 
 def right(one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Run, Any], None] | None = None) -> Run:
-    """A run that must end right, with so many digits in every field; `each` is called with run and report of every step."""
+    """A run that must end right, with so many digits in every field that is more than what rounding makes of the others.
+
+    `each` is called with run and report of every step.
+    """
     job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
     for _, report in job.steps():
         if each is not None:
             each(job, report)
     assert job.outcome == "right", (job.outcome, job.failure)
     assert max(job.worst.values()) <= 1e-11, job.worst
-    stated = job.summary()["digits"]
+    stated = summary.digits(job.errors)
     assert min(stated.values()) >= digits, stated
     return job
 

@@ -4,6 +4,8 @@
 namespace warmslip::bindings {
 namespace {
 
+constexpr std::array extent_parts{&Extent::size, &Extent::scale, &Extent::change};
+
 template <int d>
 void bind(py::module_& m) {
   using R = StepReport<d>;
@@ -20,7 +22,9 @@ void bind(py::module_& m) {
       .def_readonly("traction", &R::traction, "int sigma nu over Gamma_C, (d)")
       .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
       .def_readonly("ledger", &R::ledger)
-      .def_readonly("errors", &R::errors, "estimated, of the fields");
+      .def_readonly("errors", &R::errors, "estimated, of the fields")
+      .def_readonly("undetermined", &R::undetermined,
+                    "the digits were to be estimated, and a change of the loads has no definite answer");
 
   using Maybe = std::optional<Vec>;
   using S = Stepper<d>;
@@ -43,21 +47,35 @@ void bind(py::module_& m) {
           "Sets the state; None for a field the problem does not have.")
       .def(
           "resume",
-          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 5>& scales) {
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 13>& given) {
             std::vector<Status> statuses;
             for (const int one : status) statuses.push_back(static_cast<Status>(one));
-            s.resume(force, statuses, {scales[0], scales[1], scales[2], scales[3], scales[4]});
+            FieldExtents extents;
+            auto value = given.begin();
+            for (Extent* field : extents.all())
+              for (double Extent::*part : extent_parts) field->*part = *value++;
+            extents.force = *value;
+            s.resume(force, statuses, extents);
           },
-          py::arg("contact_force"), py::arg("status"), py::arg("scales"),
-          "After `start`: the contact points of the step before and the scales so far, for the same next step to the "
+          py::arg("contact_force"), py::arg("status"), py::arg("extents"),
+          "After `start`: the contact points of the step before and the extents so far, for the same next step to the "
           "last bit.")
       .def_property_readonly(
-          "scales",
+          "extents",
           [](const S& s) {
-            const FieldScales& f = s.scales();
-            return std::array<double, 5>{f.u, f.theta, f.stress, f.force, f.contact_force};
+            FieldExtents extents = s.extents();
+            std::array<double, 13> out{};
+            auto value = out.begin();
+            for (const Extent* field : extents.all())
+              for (double Extent::*part : extent_parts) *value++ = field->*part;
+            *value = extents.force;
+            return out;
           },
-          "Largest displacement, temperature, stress, nodal force and contact force so far.")
+          "Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may "
+          "make of it, and the largest estimated change; last the largest nodal force.")
+      .def("part", &S::part, py::arg("strained"), py::arg("strained_w"), py::arg("rigid"),
+           "After `start`: displacement and velocity of a body without supports but for rigid motions, and the "
+           "velocities of those.")
       .def("forget", &S::forget, "Drops what is remembered of earlier steps beside the state.")
       .def(
           "advance",
@@ -82,6 +100,9 @@ void bind(py::module_& m) {
           "support.")
       .def_property_readonly(
           "strained_w", [](const S& s) { return share(s.level().strained_w); }, "Velocity likewise.")
+      .def_property_readonly(
+          "rigid", [](const S& s) { return s.level().rigid; },
+          "Velocities of the rigid motions of a body without supports, along motions that the mesh gives.")
       .def_property_readonly("time", &S::time)
       .def_property_readonly(
           "contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")

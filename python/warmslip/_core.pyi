@@ -1128,6 +1128,11 @@ class StepReport2:
         estimated, of the fields
         """
     @property
+    def undetermined(self) -> bool:
+        """
+        the digits were to be estimated, and a change of the loads has no definite answer
+        """
+    @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
         """
         its tangential part, (d)
@@ -1183,22 +1188,26 @@ class Stepper2:
         """
         One step; the state stays when the outcome is not right. See StepLoads.
         """
+    def part(self, strained: petsc4py.PETSc.Vec, strained_w: petsc4py.PETSc.Vec, rigid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
+        """
     def forget(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], scales: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"]) -> None:
         """
-        After `start`: the contact points of the step before and the scales so far, for the same next step to the last bit.
+        After `start`: the contact points of the step before and the extents so far, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def scales(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(13)"]:
         """
-        Largest displacement, temperature, stress, nodal force and contact force so far.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; last the largest nodal force.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1250,6 +1259,11 @@ class Stepper2:
     def momentum_factor(self) -> Factor | None:
         ...
     @property
+    def rigid(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Velocities of the rigid motions of a body without supports, along motions that the mesh gives.
+        """
+    @property
     def solver(self) -> str:
         """
         The factorizations in words.
@@ -1295,6 +1309,11 @@ class StepReport3:
     def errors(self) -> Errors:
         """
         estimated, of the fields
+        """
+    @property
+    def undetermined(self) -> bool:
+        """
+        the digits were to be estimated, and a change of the loads has no definite answer
         """
     @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -1352,22 +1371,26 @@ class Stepper3:
         """
         One step; the state stays when the outcome is not right. See StepLoads.
         """
+    def part(self, strained: petsc4py.PETSc.Vec, strained_w: petsc4py.PETSc.Vec, rigid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
+        """
     def forget(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], scales: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"]) -> None:
         """
-        After `start`: the contact points of the step before and the scales so far, for the same next step to the last bit.
+        After `start`: the contact points of the step before and the extents so far, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def scales(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(13)"]:
         """
-        Largest displacement, temperature, stress, nodal force and contact force so far.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; last the largest nodal force.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1418,6 +1441,11 @@ class Stepper3:
     @property
     def momentum_factor(self) -> Factor | None:
         ...
+    @property
+    def rigid(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Velocities of the rigid motions of a body without supports, along motions that the mesh gives.
+        """
     @property
     def solver(self) -> str:
         """

@@ -177,9 +177,9 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
             times["whole_model"] += [timed(whole_model.step) for _ in range(TURN)]
     times |= {"contact_solver": one.contact, "balances": one.books}
     seconds = {name: settled(found) for name, found in times.items()}
-    cost = job.stepper.cost
-    if job.discretisation.operators.elasticity is not None:  # an estimate of the digits looks at the stress
-        products -= cost.estimates
+    cost, operators = job.stepper.cost, job.discretisation.operators
+    # an estimate of the digits looks at the stress, and at the heat that an error of the velocity makes
+    products -= cost.estimates * ((operators.elasticity is not None) + (operators.heating is not None))
     return (
         chosen
         | {"bricks": full.mesh.counts[0], "unknowns": job.discretisation.unknowns}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
 FIELDS = ("u", "w", "theta")
+PARTED = ("strained", "strained_w")  # u and w but for rigid motions, of a body without supports
 ESTIMATED = ("u", "theta", "stress", "contact_force")  # fields whose errors are estimated
 FUNCTIONS = "set of Python functions"
 STATUSES = (0, 1, 2)  # open, stick, slip
@@ -72,7 +73,7 @@ def save(folder: Path, job: Run) -> None:
     """Writes the state after the last step; the stepper forgets what a resumed one cannot know (collective)."""
     stepper = job.stepper
     stepper.forget()
-    fields = {name: job.discretisation.field(getattr(stepper, name)) for name in FIELDS}
+    fields = {name: job.discretisation.field(getattr(stepper, name)) for name in (*FIELDS, *PARTED)}
     owner, following = _owner(job), _values(job, (job.taken + 1) * job.scene.step)
     if job.comm.rank != 0:
         return
@@ -85,10 +86,11 @@ def save(folder: Path, job: Run) -> None:
         "errors": job.errors,
         "newton_max": job.newton_max,
         "stages": job.stages,
-        "scales": list(stepper.scales),
+        "extents": list(stepper.extents),
         "seen": job.watch.seen,
     }
     arrays = {name: values for name, values in fields.items() if values is not None}
+    arrays |= {"rigid": np.asarray(stepper.rigid)} if "strained" in arrays else {}
     arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
     newest, previous = (folder / name for name in NAMES)
     written = folder / "checkpoint.part.npz"
@@ -134,6 +136,8 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
     shapes: dict[str, tuple[int, ...]] = {"contact_force": (points * d,), "status": (points,)}
     shapes |= {"u": (nodes, d), "w": (nodes, d)} if problem.moves else {}
     shapes |= {"theta": (nodes,)} if problem.conducts else {}
+    if job.stepper.strained is not None:
+        shapes |= dict.fromkeys(PARTED, (nodes, d)) | {"rigid": np.shape(job.stepper.rigid)}
     if any(name not in arrays or arrays[name].shape != shape for name, shape in shapes.items()):
         return False
     status = arrays["status"]
@@ -149,8 +153,8 @@ def _fits(record: dict[str, Any], arrays: dict[str, Any], job: Run) -> bool:
             and worst.keys() == job.worst.keys()
             and errors.keys() <= set(ESTIMATED)
             and all(type(v) is float for v in (*worst.values(), *errors.values()))
-            and len(record["scales"]) == len(job.stepper.scales)
-            and all(type(v) is float and 0 <= v < math.inf for v in record["scales"])
+            and len(record["extents"]) == len(job.stepper.extents)
+            and all(type(v) is float and 0 <= v < math.inf for v in record["extents"])
             and job.watch.fits(record["seen"])
             and all(type(count) is int and count >= 0 for count in counts)
             and 0 < record["step"] <= job.scene.time.steps
@@ -202,7 +206,12 @@ def load(folder: Path, job: Run) -> int:
     nodes = len(job.discretisation.mesh.nodes)
     u, w, theta = (arrays.get(name, np.zeros((nodes, 1))) for name in FIELDS)
     job.discretisation.state(job.stepper, u, w, theta, float.fromhex(record["time"]))
-    job.stepper.resume(arrays["contact_force"], arrays["status"].tolist(), record["scales"])
+    if job.stepper.strained is not None:
+        parted = [job.discretisation.distributed(arrays[name]) for name in PARTED]
+        job.stepper.part(*parted, arrays["rigid"])
+        for vector in parted:
+            vector.destroy()
+    job.stepper.resume(arrays["contact_force"], arrays["status"].tolist(), record["extents"])
     job.worst, job.errors = record["worst"], record["errors"]
     job.newton_max, job.stages = record["newton_max"], record["stages"]
     job.watch.seen |= record["seen"]

@@ -86,7 +86,7 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     line |= {"outcome": job.outcome, "disagreement": difference} | {
         key: reached.get(key, float("nan")) for key in IDENTITIES
     }
-    line |= {f"error_{field}": value for field, value in job.errors.items()}
+    line |= {f"error_{field}": value for field, value in job.trusted().items()}
     line |= {
         "newton_largest": job.newton_max,
         "stage": max(job.stages, key=STAGES.index),

@@ -265,13 +265,38 @@ def touched(most: int, points: int, nearest: float) -> list[str]:
     ]
 
 
-def grazing(error: float) -> list[str]:
-    """Of the estimated relative error of the contact force, dimensionless."""
-    if not error > 1e-4:
-        return []
+SMALL = {  # fields that end no run when they have few digits: what they are small beside, and what to do
+    "contact_force": (
+        "the contact force",
+        "it is a small rest of larger forces; press the body harder where it matters",
+    ),
+    "u": ("u", "rounding of the forces and temperatures makes displacements of its size; take it for zero"),
+    "theta": (
+        "the temperature",
+        "rounding of the velocity makes temperatures of its size through heat.heating; take it for zero, or describe "
+        "the motion beside a support that moves",
+    ),
+    "stress": (
+        "the stress",
+        "rounding of the displacement makes stresses of its size; take it for zero, or describe the motion beside a "
+        "support that moves",
+    ),
+}
+
+
+UNDETERMINED = (
+    "the forces do not determine where the body is: a small change of the loads has no definite answer, as where all "
+    "points that touch slip and nothing else holds the body; what is found solves the equations, and so do others: "
+    "give the body inertia, or hold it"
+)
+
+
+def rounded(errors: dict[str, float]) -> list[str]:
+    """Of the estimated relative errors of fields, dimensionless."""
     return [
-        f"the contact force has {max(0, int(-np.log10(error)))} digits, fewer than the four of other fields: it is a small "
-        "rest of larger forces; press the body harder where it matters"
+        f"{field} keeps {max(0, int(-np.log10(error)))} of its digits, fewer than the four of other fields: {why}"
+        for (field, why), error in ((SMALL[name], error) for name, error in errors.items())
+        if error > 1e-4
     ]
 
 

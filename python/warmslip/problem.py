@@ -105,13 +105,18 @@ class Discretisation:
             ((self.problem.moves, u), (self.problem.moves, w), (self.problem.conducts, theta))
         ):
             if there:
-                vectors[i] = self.layout.vector(1 if values.ndim == 1 else self.dim)
-                self.layout.distribute(values.ravel(), vectors[i])
+                vectors[i] = self.distributed(values)
         stepper.start(*vectors, self.load_vectors.on_points("gap", time), time)
         for vector in vectors:
             if vector is not None:
                 vector.destroy()  # petsc4py would only mark it for a later collection
         return stepper
+
+    def distributed(self, values: Array) -> Any:
+        """A new vector of values in mesh numbering, (nodes, d) or (nodes,). Collective."""
+        vector = self.layout.vector(1 if values.ndim == 1 else self.dim)
+        self.layout.distribute(values.ravel(), vector)
+        return vector
 
     def field(self, vec: Any) -> Any:
         """A vector in mesh numbering on every rank: (nodes, d), or (nodes,) for theta; None for no vector. Collective."""

@@ -157,6 +157,9 @@ class Run:
                 self.worst[name] = worse(self.worst[name], value)
             for name, value in estimates(report).items():
                 self.errors[name] = max(self.errors.get(name, 0.0), value)
+            if report.undetermined:
+                together = self.scene.time.coupling == "monolithic" and self.scene.heat is not None
+                self.errors |= dict.fromkeys(FIELDS if together else set(FIELDS) - {"theta"}, 1.0)
             if log.isEnabledFor(logging.DEBUG):
                 books = ", ".join(f"{name} {value:.1e}" for name, value in residuals(report).items())
                 log.debug("step %d: %d Newton iterations, %s", n, report.newton_iterations, books)
@@ -168,6 +171,18 @@ class Run:
             return None
         said = self.comm.allgather(next((law.wrong for law in self.discretisation.laws if law.wrong), None))
         return next(filter(None, said), None)
+
+    def trusted(self) -> dict[str, float]:
+        """Estimated relative errors of the fields that were measured, dimensionless: the largest of all steps.
+
+        Also the largest change of a field against its largest value in the run, whatever rounding of other fields makes.
+        """
+        extents = np.reshape(self.stepper.extents[:-1], (-1, 3))
+        found = dict(self.errors)
+        for name, (size, _, change) in zip(FIELDS, extents, strict=True):
+            if name in found and size > 0:
+                found[name] = max(found[name], float(change / size))
+        return found
 
     def summary(self) -> dict[str, Any]:
         """What summary.json would hold now (collective)."""

@@ -51,7 +51,7 @@ def summary(job: Run) -> dict[str, Any]:
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
         "contact": contact | counts | {"traction": traction, "parts": parts},
         "identities": job.worst,
-        "digits": digits(job.errors),
+        "digits": digits(job.trusted()),
         "newton": {
             "iterations": cost.newton_iterations,
             "largest_step": job.newton_max,

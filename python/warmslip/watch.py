@@ -33,6 +33,7 @@ class Watch:
         self._impacts = bool(self._law and job.scene.inertia is not None and job.scene.inertia.density > 0)
         self.seen: dict[str, Any] = {
             "touching": 0,
+            "undetermined": 0,
             "penetration": 0.0,
             "strain": 0.0,
             "energy": 0.0,
@@ -68,6 +69,7 @@ class Watch:
     def step(self, report: Any, n: int, data: Any) -> None:
         """After step n with its data (collective when it looks at a field)."""
         seen = self.seen
+        seen["undetermined"] += report.undetermined
         if self._law:
             touching = report.stick + report.slip
             if touching > seen["touching"]:
@@ -200,7 +202,7 @@ class Watch:
         self._strain()
         self._temperatures()
         seen, heat = self.seen, self._job.scene.heat
-        out = [*before(self._d), *self.fed(), *say.strained(seen["strain"])]
+        out = [*before(self._d), *self.fed(), *self._digits(), *say.strained(seen["strain"])]
         if self._law:
             out += self._contact()
         nodes = len(self._d.mesh.nodes)
@@ -209,6 +211,11 @@ class Watch:
         if lumped:
             cure = "the mesh has obtuse angles, or the conductivity is not isotropic: refine it there"
         return out + say.beyond(seen["low"], seen["high"], nodes, cure)
+
+    def _digits(self) -> list[str]:
+        if self.seen["undetermined"]:
+            return [say.UNDETERMINED]
+        return say.rounded(self._job.trusted())
 
     def _contact(self) -> list[str]:
         d, stepper, seen = self._d, self._job.stepper, self.seen
@@ -227,7 +234,6 @@ class Watch:
             if here.any() and np.ptp(gap[of_part == i]) > 1e-12 * size(d):
                 facet = float(weights[of_part == i].max()) ** (1 / (d.dim - 1))
                 out += say.slid(d.scene.contacts[i].part, float(slip[here].max()), facet)
-        out += say.grazing(self._job.errors.get("contact_force", 0.0))
         return out + say.impact(seen["shortest"]) + self._several()
 
     def _several(self) -> list[str]:

@@ -254,7 +254,7 @@ def step_from(scene: Scene, starts: list[Array], force: Array | None, penetratio
     out = []
     for start in starts:
         stepper = d.stepper()
-        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 5)
+        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 13)
         loads = list(d.load_vectors.at(scene.step, scene.step))
         if force is not None:
             vector = d.layout.vector(d.dim)

@@ -128,6 +128,7 @@ class ContactSolver {
   double give_ = 1;             // velocity per force, the unit of the rigid motions
   double spectral_ = 0;         // largest row sum of |compliance|, a bound on its eigenvalues
   std::vector<int> factored_;   // statuses the tangent below belongs to
+  bool unsupported_ = false;    // whether it leaves a rigid motion undetermined
   std::vector<Closed> closed_;  // its rows: the points in contact
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };

@@ -47,9 +47,17 @@ struct Errors {
   double largest() const;
 };
 
-/// Largest values of the fields so far, which their errors are relative to.
-struct FieldScales {
-  double u = 0, theta = 0, stress = 0, force = 0, contact_force = 0;
+/// What is known of a field so far: its largest value, that or what rounding of the other fields may make of it if this
+/// is larger (its errors are relative to `scale`), and its largest estimated change.
+struct Extent {
+  double size = 0, scale = 0, change = 0;
+  double tried = 0;  ///< the change of the step that is being taken
+};
+struct FieldExtents {
+  Extent u, theta, stress, contact_force;
+  double force = 0;  ///< the largest nodal force so far
+
+  std::array<Extent*, 4> all() { return {&u, &theta, &stress, &contact_force}; }
 };
 
 /// Data of one step: load vectors `force` (f, v) and `heat` (q, eta), k_c theta_F included, `gap` g (points); what
@@ -77,6 +85,7 @@ struct StepReport {
   Point<d> friction_traction = Point<d>::Zero();  ///< its tangential part
   Ledger ledger{};
   Errors errors{};
+  bool undetermined = false;  ///< the digits were to be estimated, and a change of the loads has no definite answer
 };
 
 /// What a run costs, so far.
@@ -98,10 +107,14 @@ class Stepper {
           const ContactSurface<d>& surface, StepperOptions options);
 
   /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
-  /// goes on passes the contact forces and statuses of its last step and the scales so far as well: the next step is
-  /// then the same to the last bit as that of a stepper that was told to `forget` there.
+  /// goes on passes the contact forces and statuses of its last step and the extents so far as well, and for a body
+  /// without supports how its motion was parted: the next step is then the same to the last bit as that of a stepper
+  /// that was told to `forget` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
-  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldScales& scales);
+  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldExtents& extents);
+  /// After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of
+  /// those.
+  void part(Vec strained, Vec strained_w, const Eigen::VectorXd& rigid);
   /// Drops what is remembered of earlier steps beside the state.
   void forget();
   /// One step. When the outcome is not `right`, the state is the last good one.
@@ -112,7 +125,7 @@ class Stepper {
   int steps() const { return cost_.steps; }
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
-  const FieldScales& scales() const { return scales_; }
+  const FieldExtents& extents() const { return extents_; }
   const ContactSolver<d>* contact_solver() const { return contact_.get(); }  ///< nullptr without contact points
   const ContactProblem<d>& posed() const { return posed_; }                  ///< of the step tried last
   const Cost& cost() const { return cost_; }
@@ -121,6 +134,7 @@ class Stepper {
   std::string solver() const;
 
  private:
+  void take_state();
   StepReport<d> attempt(const StepLoads& loads);
   void take_factors();
   void take_motion(Mat a, int width, Symmetry symmetry, const std::string& name);
@@ -148,7 +162,9 @@ class Stepper {
   Ledger refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact);
   bool correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply);
   void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
-  void note(double& error, double& scale, double change, double size);
+  static void note(double& error, Extent& field, double change, double size, double floor);
+  void note_temperature(const Ledger& ledger);
+  void add_heat_of_error();
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
@@ -184,7 +200,8 @@ class Stepper {
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_;  // of the step that is being taken
-  FieldScales scales_;
+  FieldExtents extents_;
+  bool undetermined_ = false;
   double grazing_ = 1;  // the contact force over a hundredth of the largest force, at most 1
   double time_ = 0;
   Cost cost_;

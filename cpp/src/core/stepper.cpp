@@ -41,33 +41,49 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   take(theta, now_.theta, "theta");
   now_.gap = gap;
   time_ = time;
-  scales_ = {};
+  extents_ = {};
   forget();
+  if (!rigid_.empty()) {
+    WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
+    WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));
+    rigid_.remove(now_.strained);
+    now_.rigid = rigid_.remove(now_.strained_w);
+  }
+  take_state();
+}
+
+template <int d>
+void Stepper<d>::part(Vec strained, Vec strained_w, const Eigen::VectorXd& rigid) {
+  if (rigid_.empty()) throw std::invalid_argument("supports leave the body no rigid motion");
+  if (!strained || !strained_w || rigid.size() != now_.rigid.size())
+    throw std::invalid_argument("displacement, velocity and rigid motion are parted together");
+  WARMSLIP_PETSC(VecCopy(strained, now_.strained));
+  WARMSLIP_PETSC(VecCopy(strained_w, now_.strained_w));
+  now_.rigid = rigid;
+  take_state();
+}
+
+// What follows from the fields that were given.
+template <int d>
+void Stepper<d>::take_state() {
   if (now_.heating_w) multiply(operators_.heating, now_.straining(), now_.heating_w);
   products(now_);
 }
 
 template <int d>
 void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status,
-                        const FieldScales& scales) {
+                        const FieldExtents& extents) {
   if (contact_force.size() != contact_force_.size() || status.size() != status_.size())
     throw std::invalid_argument("contact forces and statuses need one entry a contact point");
   contact_force_ = now_.contact_force = contact_force;
   status_ = status;
-  scales_ = scales;
+  extents_ = extents;
   forget();
 }
 
-// A run that goes on knows u alone.
 template <int d>
 void Stepper<d>::forget() {
   if (contact_) contact_->forget();
-  if (rigid_.empty()) return;
-  WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
-  WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));
-  rigid_.remove(now_.strained);
-  now_.rigid = rigid_.remove(now_.strained_w);
-  products(now_);
 }
 
 // What the balances read of a step beside its two levels.
@@ -180,7 +196,9 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   const Timed timed(cost_.step_seconds);
   const int before = substitutions();
   errors_ = {};
+  undetermined_ = false;
   grazing_ = 1;
+  for (Extent* field : extents_.all()) field->tried = 0;
   ContactSolution<d> contact;
   if (momentum_ && !solve_motion(loads, contact)) {
     const bool finite = in_range(free_);
@@ -206,10 +224,12 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Ledger& ledger,
   StepReport<d> report;
   report.ledger = ledger;
   report.errors = errors_;
+  report.undetermined = undetermined_;
   report.outcome = judge(ledger);
   report.reason = why(report.outcome, ledger);
   if (report.outcome != Outcome::right) return report;
 
+  for (Extent* field : extents_.all()) field->change = std::max(field->change, field->tried);
   report.stage = contact.stage;
   report.newton_iterations = contact.iterations;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {

@@ -24,11 +24,13 @@ double Errors::largest() const {
   return worst;
 }
 
-// Notes a change as a field's error relative to its largest value so far.
+// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `floor`.
 template <int d>
-void Stepper<d>::note(double& error, double& scale, double change, double size) {
-  scale = std::max(scale, size);
-  error = scale > 0 ? change / scale : 0;
+void Stepper<d>::note(double& error, Extent& field, double change, double size, double floor) {
+  field.tried = change;
+  field.size = std::max(field.size, size);
+  field.scale = std::max({field.scale, size, floor});
+  error = field.scale > 0 ? change / field.scale : 0;
 }
 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
@@ -67,8 +69,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     rigid_.carry(motions, correction_w_);
   }
   if (monolithic) {
-    note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
-         std::max(largest_entry(next_.theta), ledger.temperature_scale));
+    note_temperature(ledger);
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
   }
   if (contact_) {
@@ -77,27 +78,26 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     settle(again, moved, correction_strained_);
     WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
   }
-  note(errors_.u, scales_.u, options_.k * largest_entry(correction_w_),
-       std::max({largest_entry(next_.u), largest_entry(now_.u), ledger.displacement_scale}));
+  note(errors_.u, extents_.u, options_.k * largest_entry(correction_w_),
+       std::max(largest_entry(next_.u), largest_entry(now_.u)), ledger.displacement_scale);
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
     WARMSLIP_PETSC(VecScale(change_u, options_.k));
     const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
-    double by_forces = Errors::unknown;
-    note(errors_.stress, scales_.stress, stress_size(layout_, problem_, change_u, change_w).largest,
-         std::max(there.largest, 1e-8 * there.possible));
-    if (next_.elastic_u) {  // inner forces far smaller than the others matter to nobody
+    note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
+         1e-8 * there.possible);
+    extents_.force = std::max(extents_.force, ledger.force_scale);
+    if (next_.elastic_u && extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
       multiply(operators_.elasticity, change_w, momentum_right_);
-      note(by_forces, scales_.force, options_.k * largest_entry(momentum_right_), ledger.force_scale);
-      errors_.stress = std::min(errors_.stress, by_forces);
+      errors_.stress = std::min(errors_.stress, options_.k * largest_entry(momentum_right_) / extents_.force);
     }
   }
   if (contact_) {
-    note(errors_.contact_force, scales_.contact_force, largest_entry(surface_.to_nodes(change.force)),
-         std::max(largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale));
-    scales_.force = std::max(scales_.force, ledger.force_scale);
-    if (scales_.force > 0) grazing_ = std::min(1.0, 1e2 * scales_.contact_force / scales_.force);
+    note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
+         largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale);
+    extents_.force = std::max(extents_.force, ledger.force_scale);
+    if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
   }
   if (apply) {
     if (contact_) contact = std::move(again);
@@ -128,14 +128,32 @@ void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
 }
 
 template <int d>
+void Stepper<d>::note_temperature(const Ledger& ledger) {
+  note(errors_.theta, extents_.theta, largest_entry(correction_theta_), largest_entry(next_.theta),
+       ledger.temperature_scale);
+}
+
+template <int d>
 void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
   if (!apply) books_.add_rounding(heat_right_, heat_external_);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
-  note(errors_.theta, scales_.theta, largest_entry(correction_theta_),
-       std::max(largest_entry(next_.theta), ledger.temperature_scale));
+  note_temperature(ledger);
   if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+}
+
+// Adds the temperature that the estimated error of the velocity makes to the change of the temperature. It ends no run:
+// where steps are long, the temperature may hardly feel the motion.
+template <int d>
+void Stepper<d>::add_heat_of_error() {
+  if (!momentum_ || !operators_.heating) return;
+  multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heat_right_);
+  fix(heat_right_, operators_.cooled, nullptr);
+  if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
+  solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
+  extents_.theta.tried += largest_entry(correction_theta_);
 }
 
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
@@ -176,8 +194,10 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   const bool wanted = measured_now(loads, contact);
   if (!wanted && !refined && !warmed) return ledger;
   const int before = substitutions();
-  if (momentum_ && (refined || wanted)) correct_motion(loads, ledger, contact, false);
+  undetermined_ = momentum_ && (refined || wanted) && !correct_motion(loads, ledger, contact, false);
+  if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
   if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
+  if (heat_ && wanted && !undetermined_) add_heat_of_error();
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return ledger;

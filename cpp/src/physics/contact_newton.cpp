@@ -117,6 +117,7 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
 
 template <int d>
 void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
+  solution.unsupported = unsupported_;
   if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
   factored_.clear();                                      // until it is whole: memory may run out on the way
   closed_.clear();
@@ -154,7 +155,7 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
-  solution.unsupported = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
+  solution.unsupported = unsupported_ = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
   if (leash_ > 0) {
     Eigen::MatrixXd weightless = tangent;
     weightless.bottomRightCorner(m, m) -= give_ * rigid_.inertia;
@@ -312,7 +313,7 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
         at.points[static_cast<std::size_t>(row / d)].by_velocity * change.template segment<d>(row);
   at.value.tail(rigid_.count()) = -problem.rigid;
   const Eigen::VectorXd response = direction(at);
-  if (!response.allFinite()) return false;
+  if (!response.allFinite() || solution.unsupported) return false;
   solution.added = response.head(all);
   solution.force = problem.known_force + solution.added;
   solution.rigid = give_ * response.tail(rigid_.count());

@@ -48,13 +48,17 @@ bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_sear
   return newton(problem, line_search, solution) && held(problem, solution);
 }
 
-// Whether a solution that was found with something else to hold the body is held by the points alone.
+// Whether a solution that was found with something else to hold the body is held by the points alone. Where all that
+// touch slip, friction leaves some room to the body, and this is one of several solutions.
 template <int d>
 bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   leash_ = lean_ = 0;
   forget();
-  factor(problem, linearise(problem, solution.added, solution.rigid), solution);
-  return !solution.unsupported;
+  const Linearisation at = linearise(problem, solution.added, solution.rigid);
+  factor(problem, at, solution);
+  return !solution.unsupported || std::ranges::any_of(at.points, [](const PointResidual<d>& point) {
+    return point.status == Status::slip && !point.smooth;
+  });
 }
 
 #define WARMSLIP_INSTANTIATE(d)                                                                  \
