@@ -146,6 +146,22 @@ def a_support_that_meets_its_foundation_to_one_rounding(d: int) -> None:
         assert right(one, digits=4.0).report.normal_force <= 1e-15
 
 
+@check
+def a_support_that_moves_until_it_meets_its_foundation(d: int) -> None:
+    """Steps that do not add up exactly press by rounding alone, whose force has no digits and needs none."""
+    for quadrature in ("nodal", "gauss-2"):
+        for end, steps in ((0.3, 7), (0.7, 7), (1.0, 49), (1.0, 3)):
+            one = scene(
+                d,
+                1,
+                time={"end": end, "steps": steps},
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"displacement": {"top": along(d, f"-0.1 * t / {end}")}},
+                contact={"part": "bottom", "stiffness": "rigid", "gap": 0.1, "quadrature": quadrature},
+            )
+            assert right(one, digits=4.0).report.normal_force <= 1e-15
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 

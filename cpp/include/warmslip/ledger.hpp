@@ -45,7 +45,8 @@ struct Ledger {
   double force_defect, heat_defect;
   double displacement_scale;  ///< a displacement that makes forces of rounding
   double temperature_scale;   ///< a temperature that rounding of the velocity makes
-  double force_scale;  ///< the largest force at a node beside its inertia: what errors of forces are compared with
+  double force_scale;    ///< the largest force at a node beside its inertia: what errors of forces are compared with
+  double contact_scale;  ///< a contact force that is none beside it
 };
 
 struct StepInputs {

@@ -255,9 +255,10 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
   l.force_defect = relative(most[defect], most[acting]);
-  // where no force is applied, inner forces of a size that rounding of u makes are none
-  l.force_scale =
-      most[applied] > 0 ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
+  // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u makes are none
+  const bool loaded = most[applied] > 1e-14 * most[inner];
+  l.force_scale = loaded ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
+  l.contact_scale = loaded ? 1e-9 * l.force_scale : l.force_scale;
   // and displacements whose forces could at most be so small are none
   if (stiffest_ > 0) l.displacement_scale = 1e-8 * l.force_scale / stiffest_;
   // as are those that rounding of a temperature makes

@@ -95,7 +95,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   }
   if (contact_) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
-         largest_entry(surface_.to_nodes(contact.force)), 1e-9 * ledger.force_scale);
+         largest_entry(surface_.to_nodes(contact.force)), ledger.contact_scale);
     extents_.force = std::max(extents_.force, ledger.force_scale);
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
   }
