@@ -23,8 +23,7 @@ void bind(py::module_& m) {
       .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
       .def_readonly("ledger", &R::ledger)
       .def_readonly("errors", &R::errors, "estimated, of the fields")
-      .def_readonly("undetermined", &R::undetermined,
-                    "the digits were to be estimated, and a change of the loads has no definite answer");
+      .def_readonly("undetermined", &R::undetermined, "a change of the loads has no definite answer");
 
   using Maybe = std::optional<Vec>;
   using S = Stepper<d>;

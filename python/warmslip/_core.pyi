@@ -1130,7 +1130,7 @@ class StepReport2:
     @property
     def undetermined(self) -> bool:
         """
-        the digits were to be estimated, and a change of the loads has no definite answer
+        a change of the loads has no definite answer
         """
     @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
@@ -1313,7 +1313,7 @@ class StepReport3:
     @property
     def undetermined(self) -> bool:
         """
-        the digits were to be estimated, and a change of the loads has no definite answer
+        a change of the loads has no definite answer
         """
     @property
     def friction_traction(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:

@@ -273,8 +273,8 @@ SMALL = {  # fields that end no run when they have few digits: what they are sma
     "u": ("u", "rounding of the forces and temperatures makes displacements of its size; take it for zero"),
     "theta": (
         "the temperature",
-        "rounding of the velocity makes temperatures of its size through heat.heating; take it for zero, or describe "
-        "the motion beside a support that moves",
+        "rounding of the motion makes temperatures of its size, by straining or by friction; take it for zero, or "
+        "describe the motion beside a support that moves",
     ),
     "stress": (
         "the stress",

@@ -99,6 +99,13 @@ class Run:
         self.stepper = self.discretisation.stepper(backend=backend)
         self.worst = dict.fromkeys(IDENTITIES, 0.0)
         self.errors: dict[str, float] = {}  # largest estimated relative error of each field that was measured
+        contacts, materials = scene.contacts, self.discretisation.problem.materials
+        warmed = any(material.heating is not None for material in materials) or any(
+            contact.friction_heating is not None or (contact.heat_exchange and contact.heat_exchange.per_pressure)
+            for contact in contacts
+        )
+        # fields that have no digits where nothing determines the place of the body
+        self._by_place = FIELDS if warmed and scene.heat is not None else tuple(f for f in FIELDS if f != "theta")
         self.outcome = "right"
         self.report: Any = None
         self._resumed = 0  # steps of an earlier process
@@ -158,8 +165,7 @@ class Run:
             for name, value in estimates(report).items():
                 self.errors[name] = max(self.errors.get(name, 0.0), value)
             if report.undetermined:
-                together = self.scene.time.coupling == "monolithic" and self.scene.heat is not None
-                self.errors |= dict.fromkeys(FIELDS if together else set(FIELDS) - {"theta"}, 1.0)
+                self.errors |= dict.fromkeys(self._by_place, 1.0)
             if log.isEnabledFor(logging.DEBUG):
                 books = ", ".join(f"{name} {value:.1e}" for name, value in residuals(report).items())
                 log.debug("step %d: %d Newton iterations, %s", n, report.newton_iterations, books)

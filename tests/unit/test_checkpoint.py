@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,43 +18,12 @@ import h5py
 import numpy as np
 import pytest
 from conftest import Command, child_environment
+from stopped import KilledError, readable, same, scene, stop_after
 
 import warmslip
-from warmslip import Scene, checkpoint, export, load
+from warmslip import Scene, checkpoint, export
 from warmslip.runner import Run
 from warmslip.scene import build
-
-KEYS = ["mesh.n=8", "time.steps=24", "output.every=7", "output.checkpoint=5"]
-
-
-def scene(*more: str) -> Scene:
-    return load("paper_mixed", [*KEYS, "contact.heat_exchange.foundation_temperature=10.0", *more])
-
-
-def contents(path: Path) -> dict[str, np.ndarray]:
-    found = {}
-    with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
-    return found
-
-
-def same(one: Path, other: Path) -> None:
-    first, second = contents(one / "trajectory.h5"), contents(other / "trajectory.h5")
-    assert first.keys() == second.keys()
-    for name, values in first.items():
-        assert np.array_equal(values, second[name]), name
-
-
-class KilledError(Exception):
-    pass
-
-
-def stop_after(steps: int) -> Callable[[int, int, object], None]:
-    def progress(step: int, _: int, __: object) -> None:
-        if step == steps:
-            raise KilledError
-
-    return progress
 
 
 @pytest.mark.parametrize(
@@ -170,18 +138,6 @@ def test_a_series_that_lacks_its_last_row_cuts_the_others(tmp_path: Path, shorte
         with pytest.raises(IndexError, match=f"there are {steps} steps"):
             t.contact("force", steps)
     assert export.export(tmp_path, tmp_path / "series") == 24
-
-
-def readable(path: Path) -> None:
-    """What a killed run left is whole to its last second: as many steps in every series, and states of those."""
-    with warmslip.Trajectory(path) as t:
-        lengths = {len(values) for group in ("steps", "ledger") for values in t.series(group).values()}
-        lengths |= {len(t.series("contact")[name]) for name in ("force", "displacement", "status", "gap")}
-        assert len(lengths) == 1
-        assert len(t.time) == len(t.u) == len(t.w) == len(t.theta) >= 1
-        (steps,) = lengths
-        step = t.scene["time"]["end"] / t.scene["time"]["steps"]
-        assert round(float(t.time[-1]) / step) <= steps and np.isfinite(t.u[-1]).all()
 
 
 def killed(folder: Path, after: float | None) -> bool:
@@ -408,79 +364,3 @@ def test_a_run_that_has_ended_right_is_not_computed_again(tmp_path: Path) -> Non
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     again(scene())
     assert len(taken) == 24
-
-
-@pytest.fixture(name="small_disk")
-def _small_disk(tmp_path: Path) -> Any:
-    """A file system of two megabytes; only root can make one."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    made = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(made, capture_output=True, check=False).returncode != 0:
-        pytest.skip("a small file system cannot be mounted here")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_a_full_disk_ends_in_a_sentence_and_can_be_gone_on_from(
-    command: Command, small_disk: Path, tmp_path: Path
-) -> None:
-    keys = ["mesh.n=16", "time.steps=300", "output.every=1", "output.checkpoint=3"]
-    call = ["run", "paper_mixed", *(word for key in keys for word in ("--set", key)), "--out"]
-    full = command(*call, small_disk / "run")
-    assert full.returncode == 1
-    assert (
-        full.stderr.split()
-        == (
-            f"error: the disk is full ({small_disk / 'run'}); make room, then go on from the last checkpoint with --resume"
-        ).split()
-    )
-    readable(small_disk / "run" / "trajectory.h5")
-    assert {path.name for path in (small_disk / "run").iterdir()} == {*checkpoint.NAMES, "trajectory.h5"}
-    shutil.copytree(small_disk / "run", tmp_path / "run")
-    assert command(*call, tmp_path / "whole").returncode == 0
-    again = command(*call, tmp_path / "run", "--resume")
-    assert again.returncode == 0, again.stderr
-    same(tmp_path / "whole", tmp_path / "run")
-
-
-@pytest.mark.parametrize("every", [5, 100], ids=["checkpoints", "too short for one"])
-def test_a_disk_that_is_full_at_the_end_loses_nothing(tmp_path: Path, monkeypatch: Any, every: int) -> None:
-    one = scene(f"output.checkpoint={every}")
-    whole = warmslip.run(one, out=tmp_path / "whole")
-
-    def full(path: Path, *fields: Any) -> None:
-        path.write_bytes(b"half")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(warmslip.mesh_io, "write_vtu", full)
-    with pytest.raises(OSError, match="No space left") as raised:
-        warmslip.run(one, out=tmp_path / "run")
-    assert raised.value.filename == str(tmp_path / "run")  # what the command names in its sentence
-    left = {path.name for path in (tmp_path / "run").iterdir()}
-    assert left == {"trajectory.h5", "summary.json", *(checkpoint.NAMES if every == 5 else ())}
-    same(tmp_path / "whole", tmp_path / "run")
-    monkeypatch.undo()
-    again = warmslip.run(one, out=tmp_path / "run", resume=True)
-    assert again.right and np.array_equal(again.u, whole.u)
-    left = {path.name for path in (tmp_path / "run").iterdir()}
-    assert left == {"trajectory.h5", "summary.json", "final.vtu"}
-    assert (tmp_path / "run" / "final.vtu").read_bytes() == (tmp_path / "whole" / "final.vtu").read_bytes()
-
-
-def test_a_checkpoint_that_cannot_be_written_leaves_those_before(tmp_path: Path, monkeypatch: Any) -> None:
-    with pytest.raises(KilledError):
-        warmslip.run(scene(), out=tmp_path, progress=stop_after(7))
-    before = (tmp_path / checkpoint.NAMES[0]).read_bytes()
-
-    def full(path: Path, **arrays: Any) -> None:
-        path.write_bytes(b"half")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(np, "savez", full)
-    with pytest.raises(OSError, match="No space left"):
-        warmslip.run(scene(), out=tmp_path, resume=True)
-    assert (tmp_path / checkpoint.NAMES[0]).read_bytes() == before
-    assert not (tmp_path / "checkpoint.part.npz").exists()
-    monkeypatch.undo()
-    assert Run(scene()).resume(tmp_path) == 5

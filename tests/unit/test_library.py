@@ -305,3 +305,23 @@ def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
     )
     (said,) = [s for s in estimate.measured(file).suspicious if "differ in normal" in s]
     assert said.startswith("10 contact points at 9 nodes: around 1 of them")
+
+
+SAID = {
+    **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
+    "brake_pad": [
+        "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution"
+    ],
+    "block_with_hole": ["the largest strain is 23.3 %"],
+    "creep_column": ["the body sinks into the foundation by 0.0882, 4.4 %"],
+    "sliding_block": ["18 of 153 temperatures lie below 0"],
+    "wavy_road": ["the gap of 'bottom' is -0.01 at its nearest point", "the body sinks into the foundation by 0.0142"],
+}
+
+
+@pytest.mark.parametrize("name", [name for name in library() if name != "hertz"])
+def test_what_a_run_says(name: str) -> None:
+    said, expected = warmslip.run(warmslip.load(name)).summary["warnings"], SAID.get(name, [])
+    assert len(said) == len(expected) and all(
+        one.startswith(words) for one, words in zip(said, expected, strict=True)
+    ), said

@@ -14,7 +14,7 @@ from conftest import Command
 import warmslip
 from warmslip import Loads, Scene, estimate, explain, growth, plausibility
 from warmslip.problem import Discretisation, discretise, make_mesh
-from warmslip.scene import build, library
+from warmslip.scene import build
 
 PRESSED: dict[str, Any] = {  # and nothing to say of it
     "mesh": {"shape": "square", "n": 8},
@@ -49,7 +49,7 @@ KELVIN = {
 }
 
 STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
-# a column, as in test_long_runs, in steps of 0.54 where 0.533 is the longest that staggered ones stand
+# a column, as in test_coupling_limit, in steps of 0.54 where 0.533 is the longest that staggered ones stand
 COUPLED: dict[str, Any] = {
     "mesh": {"shape": "square", "n": 4},
     "time": {"end": 162.0, "steps": 300},
@@ -351,26 +351,6 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in job.steps():
         pass
     assert 1 <= len(gathered) <= 5
-
-
-LIBRARY = {
-    **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
-    "brake_pad": [
-        "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution"
-    ],
-    "block_with_hole": ["the largest strain is 23.3 %"],
-    "creep_column": ["the body sinks into the foundation by 0.0882, 4.4 %"],
-    "sliding_block": ["18 of 153 temperatures lie below 0"],
-    "wavy_road": ["the gap of 'bottom' is -0.01 at its nearest point", "the body sinks into the foundation by 0.0142"],
-}
-
-
-@pytest.mark.parametrize("name", [name for name in library() if name != "hertz"])
-def test_what_is_said_of_the_library(name: str) -> None:
-    said, expected = warnings(warmslip.load(name)), LIBRARY.get(name, [])
-    assert len(said) == len(expected) and all(
-        one.startswith(words) for one, words in zip(said, expected, strict=True)
-    ), said
 
 
 def test_what_is_taken_for_granted() -> None:

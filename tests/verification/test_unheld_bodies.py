@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from boxes import FAR, SIDES, axis_of, elasticity, right, scene, turned
+from boxes import FAR, SIDES, along, axis_of, elasticity, right, scene, turned
 from ranked import Checks
 
 from warmslip import Run, discretise
@@ -109,6 +109,39 @@ def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
     job = Run(one)
     assert (len(list(job.steps())), job.outcome) == (2, "unsupported")
     assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
+
+
+@check
+def a_push_that_friction_resists(d: int) -> None:
+    """Far below the friction bound it moves nothing, whichever way it points, on a body that shrinks on its points."""
+    if d == 3:
+        return  # Newton's method alone finds these
+    for n, gap in ((1, 0.0), (1, 1e-4), (4, 0.0)):
+        for stiffness in (1e10, "rigid"):
+            for push in (0.0, 1e-6, 1e-3, 1.0, 5e3):
+                for sign in (1, -1):
+                    job = Run(
+                        scene(
+                            d,
+                            n,
+                            length=0.1,
+                            time={"end": 300.0, "steps": 3},
+                            elasticity=elasticity(d, 2.1e11, 0.3),
+                            heat={"conductivity": 50.0, "capacity": 3.6e6, "expansion": {"tensor": 6.3e6}},
+                            loads={"body": along(d, -76518.0, sign * push)},
+                            initial={"temperature": 20.0},
+                            contact={
+                                "part": "bottom",
+                                "stiffness": stiffness,
+                                "gap": gap,
+                                "friction": {"coefficient": 0.3},
+                                "heat_exchange": {"conductance": 1e3},
+                            },
+                        )
+                    )
+                    for _ in job.steps():
+                        pass
+                    assert job.outcome == "right", (n, gap, stiffness, sign * push, job.failure)
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

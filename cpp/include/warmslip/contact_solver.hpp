@@ -50,7 +50,8 @@ struct ContactSolution {
   Eigen::VectorXd rigid;            ///< (motions), velocity
   std::vector<Status> status;
   bool converged = false;
-  bool unsupported = false;  ///< nothing determines a rigid motion
+  bool unsupported = false;   ///< nothing determines a rigid motion, and no solution was found
+  bool undetermined = false;  ///< nor does anything in the solution that was found: there are others
   Stage stage = Stage::none;
   int iterations = 0;       ///< Newton steps of all stages
   int factorizations = 0;   ///< of the dense tangent

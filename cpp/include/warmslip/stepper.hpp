@@ -85,7 +85,7 @@ struct StepReport {
   Point<d> friction_traction = Point<d>::Zero();  ///< its tangential part
   Ledger ledger{};
   Errors errors{};
-  bool undetermined = false;  ///< the digits were to be estimated, and a change of the loads has no definite answer
+  bool undetermined = false;  ///< a change of the loads has no definite answer
 };
 
 /// What a run costs, so far.
@@ -134,6 +134,12 @@ class Stepper {
   std::string solver() const;
 
  private:
+  /// Heat that contact nodes lose by what they are warmer than the foundation, and what they receive whatever they are.
+  struct NodalFlow {
+    Eigen::MatrixXd lost;
+    Eigen::VectorXd given;
+  };
+
   void take_state();
   StepReport<d> attempt(const StepLoads& loads);
   void take_factors();
@@ -152,7 +158,7 @@ class Stepper {
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside, Vec out);
-  void take_flow(const StepLoads& loads);
+  NodalFlow flow(const StepLoads& loads, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) const;
   Ledger balance(const StepInputs& inputs);
   Errors weighed() const;
   Outcome judge(const Ledger& ledger) const;
@@ -163,8 +169,9 @@ class Stepper {
   bool correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply);
   void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
   static void note(double& error, Extent& field, double change, double size, double floor);
+  bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
   void note_temperature(const Ledger& ledger);
-  void add_heat_of_error();
+  void add_heat_of_error(const StepLoads& loads);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
@@ -188,15 +195,15 @@ class Stepper {
   Level now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
   VecHandle correction_strained_;                // the correction but for a rigid motion
+  Eigen::VectorXd correction_force_;             // of the contact points
   Eigen::MatrixXd carried_;                      // velocities of the contact points in the rigid motions
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for rigid_ and constants_
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
   Eigen::VectorXd free_;                         // velocity of the contact points without contact force
   Eigen::VectorXd rigid_load_;                   // load on the rigid motions
-  Eigen::MatrixXd flow_;        // heat that contact nodes lose by what they are warmer than the foundation
-  Eigen::VectorXd given_flow_;  // and what they receive whatever they are
-  Eigen::VectorXd beside_;      // temperature of the foundation at the contact nodes
-  ContactProblem<d> posed_;     // the contact problem that was solved last
+  NodalFlow flow_;
+  Eigen::VectorXd beside_;   // temperature of the foundation at the contact nodes
+  ContactProblem<d> posed_;  // the contact problem that was solved last
   Eigen::VectorXd contact_force_;
   std::vector<Status> status_;
   Errors errors_;  // of the step that is being taken

@@ -48,6 +48,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
   ContactSolution<d> change, again;
+  correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
   if (contact_) {
     const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
     posed_.known_force = contact.force;
@@ -55,7 +56,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     posed_.rigid = rigid_load_;
     posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
     again = contact;
-    if (!(apply ? solve_contact(contact.force, again) : contact_->respond(posed_, correction, again))) return false;
+    if (!(apply ? solve_contact(contact.force, again) : respond(correction, again))) return false;
     if (apply) free_ = posed_.free;
     change = again;
     change.force = again.added;
@@ -96,6 +97,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   if (contact_) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
          largest_entry(surface_.to_nodes(contact.force)), ledger.contact_scale);
+    correction_force_ = change.force;
     extents_.force = std::max(extents_.force, ledger.force_scale);
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
   }
@@ -137,23 +139,41 @@ template <int d>
 void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
   books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
   if (!apply) books_.add_rounding(heat_right_, heat_external_);
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note_temperature(ledger);
   if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
 
-// Adds the temperature that the estimated error of the velocity makes to the change of the temperature. It ends no run:
-// where steps are long, the temperature may hardly feel the motion.
+// Adds the temperature that the estimated errors of velocity and contact force make, by straining and by what the
+// contact leads and rubs, to the change of the temperature. It ends no run: where steps are long, the temperature may
+// hardly feel the motion.
 template <int d>
-void Stepper<d>::add_heat_of_error() {
-  if (!momentum_ || !operators_.heating) return;
-  multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heat_right_);
+void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
+  if (!operators_.heating && !reactive()) return;
+  WARMSLIP_PETSC(VecSet(heat_right_, 0));
+  if (operators_.heating)
+    multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heat_right_);
   fix(heat_right_, operators_.cooled, nullptr);
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(given_flow_.size());
-  solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
+  Eigen::VectorXd given = none;
+  if (reactive()) {
+    const Eigen::VectorXd velocity = surface_.nodal_values(next_.w) + surface_.nodal_values(correction_w_),
+                          warmer = surface_.nodal_values(next_.theta) - beside_;
+    const NodalFlow there = flow(loads, next_.contact_force + correction_force_, surface_.at_points(velocity));
+    given = there.given - flow_.given - (there.lost - flow_.lost) * warmer;
+  }
+  solve_heat(heat_right_, heat_external_, given, none, correction_theta_);
   extents_.theta.tried += largest_entry(correction_theta_);
+}
+
+// The response of the contact; every rank found it, and they agree whether there is one.
+template <int d>
+bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact) {
+  int found = contact_->respond(posed_, correction, contact);
+  MPI_Bcast(&found, 1, MPI_INT, 0, layout_.comm());
+  return found != 0;
 }
 
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
@@ -191,13 +211,15 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     warmer = errors_.theta;
     warmed = true;
   }
+  undetermined_ = contact.undetermined;
   const bool wanted = measured_now(loads, contact);
   if (!wanted && !refined && !warmed) return ledger;
   const int before = substitutions();
-  undetermined_ = momentum_ && (refined || wanted) && !correct_motion(loads, ledger, contact, false);
+  const bool moved = momentum_ && (refined || wanted);
+  if (moved && !undetermined_) undetermined_ = !correct_motion(loads, ledger, contact, false);
   if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
   if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
-  if (heat_ && wanted && !undetermined_) add_heat_of_error();
+  if (heat_ && moved && !undetermined_) add_heat_of_error(loads);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return ledger;

@@ -139,10 +139,11 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.rigid.data(), static_cast<int>(solution.rigid.size()), MPI_DOUBLE, 0, layout_.comm());
-  int found[] = {solution.converged, solution.unsupported};
-  MPI_Bcast(found, 2, MPI_INT, 0, layout_.comm());
+  int found[] = {solution.converged, solution.unsupported, solution.undetermined};
+  MPI_Bcast(found, 3, MPI_INT, 0, layout_.comm());
   solution.converged = found[0] != 0;
   solution.unsupported = found[1] != 0;
+  solution.undetermined = found[2] != 0;
   solution.status.resize(posed_.points.size(), Status::open);
   MPI_Bcast(solution.status.data(), static_cast<int>(solution.status.size()), MPI_SIGNED_CHAR, 0, layout_.comm());
   cost_.newton_iterations += solution.iterations;
@@ -184,19 +185,19 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
 // warmer than the foundation beside it, less what it receives at that temperature, from friction say. Counted from zero
 // the two would cancel where the contact leads heat well.
 template <int d>
-void Stepper<d>::take_flow(const StepLoads& loads) {
+typename Stepper<d>::NodalFlow Stepper<d>::flow(const StepLoads& loads, const Eigen::VectorXd& force,
+                                                const Eigen::VectorXd& velocity) const {
   const auto& shape = surface_.scalar_shape();
-  const ContactFlow flow =
-      contact_flow(problem_, surface_, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)), free_);
-  flow_ = shape.transpose() * flow.conductance.asDiagonal() * shape;
-  beside_ = surface_.nodal_mean(loads.foundation);
-  given_flow_ =
-      shape.transpose() * (flow.conductance.cwiseProduct(loads.foundation - shape * beside_) + flow.friction).eval();
-  for (Eigen::Index i = 0; i < given_flow_.size(); ++i)
+  const ContactFlow at = contact_flow(problem_, surface_, force, velocity, free_);
+  NodalFlow out{shape.transpose() * at.conductance.asDiagonal() * shape, {}};
+  out.given =
+      shape.transpose() * (at.conductance.cwiseProduct(loads.foundation - shape * beside_) + at.friction).eval();
+  for (Eigen::Index i = 0; i < out.given.size(); ++i)
     if (fixed_contact_[static_cast<std::size_t>(i)]) {  // a held temperature takes any flow
-      flow_.row(i).setZero();
-      given_flow_[i] = 0;
+      out.lost.row(i).setZero();
+      out.given[i] = 0;
     }
+  return out;
 }
 
 template <int d>
@@ -204,8 +205,11 @@ void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
   const Timed timed(cost_.heat_seconds);
   heat_right_side(loads, heating_w, 1);
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
-  if (reactive()) take_flow(loads);
-  solve_heat(heat_right_, heat_external_, given_flow_, beside_, next_.theta);
+  if (reactive()) {
+    beside_ = surface_.nodal_mean(loads.foundation);
+    flow_ = flow(loads, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)));
+  }
+  solve_heat(heat_right_, heat_external_, flow_.given, beside_, next_.theta);
 }
 
 // The temperatures theta_c = beside + t of the contact nodes, free - C (flow t - given) + W_c a with the constants a
@@ -229,18 +233,18 @@ void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& give
   const Eigen::MatrixXd& compliance = heat_->compliance();
   Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n + m, n + m);
   Eigen::VectorXd loads(n + m);
-  system.topLeftCorner(n, n) += compliance * flow_;
+  system.topLeftCorner(n, n) += compliance * flow_.lost;
   loads.head(n) = free - beside + compliance * given;
   if (m > 0) {
     Eigen::MatrixXd along(n, m);
     for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(constants_.along(j));
     system.topRightCorner(n, m) = -along;
-    system.bottomLeftCorner(m, n) = along.transpose() * flow_;
+    system.bottomLeftCorner(m, n) = along.transpose() * flow_.lost;
     system.bottomRightCorner(m, m) = constants_.inertia();
     loads.tail(m) = load + along.transpose() * given;
   }
   const Eigen::VectorXd found = system.partialPivLu().solve(loads);
-  heat_->expand(flow_ * found.head(n) - given, out);
+  heat_->expand(flow_.lost * found.head(n) - given, out);
   if (m > 0) {
     constants_.strain(found.tail(m), out);
     constants_.carry(found.tail(m), out);

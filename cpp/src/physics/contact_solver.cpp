@@ -93,6 +93,10 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
+  if (solution.converged && rigid_.count() > 0 && !massive) {
+    factor(problem, linearise(problem, solution.added, solution.rigid), solution);
+    solution.undetermined = solution.unsupported;
+  }
   solution.unsupported = solution.unsupported && !solution.converged;
   solution.rigid *= give_;
   return solution;

@@ -48,8 +48,8 @@ bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_sear
   return newton(problem, line_search, solution) && held(problem, solution);
 }
 
-// Whether a solution that was found with something else to hold the body is held by the points alone. Where all that
-// touch slip, friction leaves some room to the body, and this is one of several solutions.
+// Whether a solution that was found with something else to hold the body is held by the points alone. Where points slip
+// with friction, that may leave some room to the body, and this is one of several solutions.
 template <int d>
 bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   leash_ = lean_ = 0;
