@@ -208,6 +208,30 @@ TEST_CASE_TEMPLATE("the residual vanishes exactly on the law", D, Two, Three) {
   CHECK(size(still, -k * 10 * nu) <= 1e-14);              // open
 }
 
+TEST_CASE_TEMPLATE("a pull and a depth of rounding on a rigid foundation are a residual of rounding", D, Two, Three) {
+  constexpr int d = D::value;
+  Body<d> body = random_body<d>(3, 2, 0.0);
+  body.problem.laws[0].compliance.stiffness = unlimited;
+  const auto normal = [&](std::size_t i) { return body.problem.points[i].normal; };
+  Eigen::VectorXd force(2 * d), velocity(2 * d);
+  for (const double depth : {1e-15, -1e-15, 1e-3})
+    for (const double pull : {1e-15, 0.0, -1e-15, 1e-3}) {
+      force << -pull * normal(0), normal(1);
+      for (std::size_t i = 0; i < 2; ++i) {
+        const double wanted = i == 0 ? depth : 0;
+        velocity.segment<d>(static_cast<Eigen::Index>(i) * d) =
+            (wanted - body.problem.points[i].penetration) / body.problem.step * normal(i);
+      }
+      const double found = law_residual<d>(body.problem, force, velocity);
+      CAPTURE(depth);
+      CAPTURE(pull);
+      if (depth == 1e-3 || pull == 1e-3)
+        CHECK((found >= 1e-5 && found <= 1e-1));
+      else
+        CHECK(found <= 1e-13);
+    }
+}
+
 TEST_CASE_TEMPLATE("random bodies: the law within 1e-12, whatever it takes", D, Two, Three) {
   constexpr int d = D::value;
   std::array<int, 3> statuses{};

@@ -10,8 +10,8 @@ namespace {
 
 constexpr const char* beyond_doubles = "a number overflowed; scale the data";
 constexpr const char* unsupported =
-    "nothing holds the body in a step without inertia: it may move and touches nothing, or slides freely on what it "
-    "touches; give it a support, friction or an [inertia] table";
+    "nothing was found to hold the body in a step without inertia: it may move and touches nothing, slides freely on "
+    "what it touches, or is balanced on its points; give it a support, friction or an [inertia] table";
 
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>

@@ -9,7 +9,6 @@ namespace {
 
 // How far the penetration r is from those that bear `pressure`; infinite where none does, or none is known to.
 double distance(const NormalCompliance& law, double pressure, double r) {
-  if (pressure < 0) return unlimited;
   if (pressure == 0) return std::max(r, 0.0);
   if (law.rigid()) return std::abs(r);
   if (law.custom) {
@@ -65,9 +64,10 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
       continue;
     }
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
-                 away = distance(law.compliance, lambda / point.weight, r);
-    const double wrong = largest > 0 ? off / largest : unlimited;
-    const double normal = off == 0 || away == 0 ? 0 : std::min(wrong, away / reach);
+                 away = distance(law.compliance, std::max(lambda, 0.0) / point.weight, r), pull = std::max(-lambda, 0.0);
+    const auto of_forces = [&](double force) { return largest > 0 ? force / largest : unlimited; };
+    const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
+    const double normal = off == 0 ? 0 : std::min(of_forces(off), apart);
     const double friction =
         friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
     if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;

@@ -191,14 +191,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
     const Linearisation at = linearise(problem, solution.added, solution.rigid);
     solution.velocity = at.velocity;
     if (!accept(problem, solution)) continue;
-    // a point that touches without a force holds no body: it may turn away
-    const auto idle = [&](std::size_t i) {
-      const Point<d> force = solution.force.template segment<d>(static_cast<Eigen::Index>(i) * d);
-      return (code >> (2 * i) & 3) != 0 && !(force.dot(problem.points[i].normal) > 1e-14 * solution.force.norm());
-    };
-    bool holds = m == 0 || held(problem, solution);
-    for (std::size_t i = 0; i < count && m > 0; ++i) holds = holds && !idle(i);
-    if (!holds) continue;
+    if (m > 0 && !held(problem, solution)) continue;
     solution.status.clear();
     for (const auto& point : at.points) solution.status.push_back(point.status);
     return true;

@@ -72,6 +72,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   if (rigid_.count() > 0)  // it may have to come to the foundation first
     for (const bool line_search : {true, false})
       attempt(Stage::restart, [&] { return approach(problem, line_search, solution); });
+  if (rigid_.count() > 0 && !massive) attempt(Stage::restart, [&] { return draw(problem, solution); });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
   // again from no force, with other scales of the tangential rows
   for (const double boldness : {1.0, 0.1, 10.0, 0.01})

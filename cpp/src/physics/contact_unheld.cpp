@@ -48,14 +48,58 @@ bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_sear
   return newton(problem, line_search, solution) && held(problem, solution);
 }
 
-// Whether a solution that was found with something else to hold the body is held by the points alone. Where points slip
-// with friction, that may leave some room to the body, and this is one of several solutions.
+// A body without mass is lent some. Each solve starts from where the last one ended and the mass falls, so that the body
+// is drawn to where friction alone holds it.
+template <int d>
+bool ContactSolver<d>::draw(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  const Eigen::Index m = rigid_.count();
+  ContactProblem<d> heavy = problem;
+  RigidCoupling lent = rigid_;
+  glue(problem, solution);
+  double mass = 1, unbalanced = 0;
+  for (int step = 0; step < 40; ++step, mass /= 4) {
+    lent.inertia = mass / give_ * Eigen::MatrixXd::Identity(m, m);
+    heavy.rigid = problem.rigid + mass * solution.rigid;
+    ContactSolution<d> found = ContactSolver(compliance_, options_, lent).solve(heavy, total(problem, solution.added));
+    solution.iterations += found.iterations;
+    solution.factorizations += found.factorizations;
+    if (!found.converged) return false;
+    const double before = unbalanced;
+    unbalanced = mass * (found.rigid / give_ - solution.rigid).norm();
+    if (step > 3 && unbalanced >= 0.5 * before && unbalanced > 1e-6 * found.force.norm()) return false;  // it is off
+    solution.added = found.added;
+    solution.rigid = found.rigid / give_;
+    ContactSolution<d> finished = solution;
+    forget();
+    const bool done = newton(problem, true, finished) && held(problem, finished);
+    solution.iterations = finished.iterations;
+    solution.factorizations = finished.factorizations;
+    solution.unsupported = finished.unsupported;
+    if (done) {
+      solution = std::move(finished);
+      return true;
+    }
+  }
+  return false;
+}
+
+// Whether a solution that was found with something else to hold the body is held by the points alone. A point that
+// touches without a force holds nothing: the body may turn away from it. Where points slip with friction, that may leave
+// some room to the body, and this is one of several solutions.
 template <int d>
 bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   leash_ = lean_ = 0;
+  Linearisation at = linearise(problem, solution.added, solution.rigid);
+  const Eigen::VectorXd force = total(problem, solution.added);
+  for (std::size_t i = 0; i < at.points.size(); ++i) {
+    const double lambda = force.segment<d>(static_cast<Eigen::Index>(i) * d).dot(problem.points[i].normal);
+    if (lambda > 1e-14 * force.norm()) continue;
+    at.points[i].status = Status::open;
+    at.points[i].away = at.points[i].smooth = true;
+  }
   forget();
-  const Linearisation at = linearise(problem, solution.added, solution.rigid);
   factor(problem, at, solution);
+  forget();
   return !solution.unsupported || std::ranges::any_of(at.points, [](const PointResidual<d>& point) {
     return point.status == Status::slip && !point.smooth;
   });
@@ -63,6 +107,7 @@ bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>
 
 #define WARMSLIP_INSTANTIATE(d)                                                                  \
   template bool ContactSolver<d>::approach(const ContactProblem<d>&, bool, ContactSolution<d>&); \
+  template bool ContactSolver<d>::draw(const ContactProblem<d>&, ContactSolution<d>&);           \
   template bool ContactSolver<d>::held(const ContactProblem<d>&, ContactSolution<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
