@@ -64,7 +64,8 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
       continue;
     }
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
-                 away = distance(law.compliance, std::max(lambda, 0.0) / point.weight, r), pull = std::max(-lambda, 0.0);
+                 away = distance(law.compliance, std::max(lambda, 0.0) / point.weight, r),
+                 pull = std::max(-lambda, 0.0);
     const auto of_forces = [&](double force) { return largest > 0 ? force / largest : unlimited; };
     const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
     const double normal = off == 0 ? 0 : std::min(of_forces(off), apart);

@@ -48,8 +48,8 @@ bool ContactSolver<d>::approach(const ContactProblem<d>& problem, bool line_sear
   return newton(problem, line_search, solution) && held(problem, solution);
 }
 
-// A body without mass is lent some. Each solve starts from where the last one ended and the mass falls, so that the body
-// is drawn to where friction alone holds it.
+// A body without mass is lent some. Each solve starts from where the last one ended and the mass falls, so that the
+// body is drawn to where friction alone holds it.
 template <int d>
 bool ContactSolver<d>::draw(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   const Eigen::Index m = rigid_.count();
@@ -84,8 +84,8 @@ bool ContactSolver<d>::draw(const ContactProblem<d>& problem, ContactSolution<d>
 }
 
 // Whether a solution that was found with something else to hold the body is held by the points alone. A point that
-// touches without a force holds nothing: the body may turn away from it. Where points slip with friction, that may leave
-// some room to the body, and this is one of several solutions.
+// touches without a force holds nothing: the body may turn away from it. Where points slip with friction, that may
+// leave some room to the body, and this is one of several solutions.
 template <int d>
 bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   leash_ = lean_ = 0;
