@@ -177,7 +177,8 @@ def shares(coefficient: float) -> list[str]:
     return [
         f"the friction coefficient is {coefficient:g} where contact points share their normal forces in many ways, as more "
         "points than nodes do on a rigid foundation and two parts at a corner: a step may have several solutions, of which "
-        "Newton's method takes the one it reaches from the forces of the step before; take a finite contact.stiffness there"
+        "Newton's method takes the one it reaches from the forces of the step before, and the digits are those of the sums of "
+        "these forces at the nodes, not of single ones; take a finite contact.stiffness there"
     ]
 
 

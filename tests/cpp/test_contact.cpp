@@ -306,10 +306,10 @@ TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, wh
       for (int a = 0; a < d; ++a) vector_shape.insert(q * d + a, node * d + a) = value;
     }
   }
-  int compared = 0, rested = 0, moved = 0, clipped = 0;
-  for (unsigned seed = 0; seed < 100; ++seed) {
-    const double friction = 0.05 + 0.1 * (seed % 8);
-    const Body<d> body = random_body<d>(seed, nodes, friction);
+  int compared = 0, rested = 0, slipped = 0, moved = 0, clipped = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const double friction = 0.05 + 0.1 * (seed % 8), stiffness = seed % 3 == 0 ? unlimited : 100;
+    const Body<d> body = random_body<d>(seed, nodes, friction, stiffness);
     const Eigen::VectorXd push = Point<d>::Unit(d - 1).replicate(nodes, 1);  // mostly towards the foundation
     ContactProblem<d> problem{
         body.problem.laws, body.problem.step, {}, vector_shape * (0.5 * body.problem.free + 2 * push)};
@@ -349,15 +349,18 @@ TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, wh
       moved += (before[i].force - least).norm() > 1e-3 * least.norm();
     }
     for (int q = 0; q < points; ++q) {
-      if (found[0].status[static_cast<std::size_t>(q)] != Status::stick) continue;
+      const Status status = found[0].status[static_cast<std::size_t>(q)];
+      slipped += status == Status::slip && stiffness == unlimited;
+      if (status != Status::stick) continue;
       ++rested;
       const Point<d> f = least.template segment<d>(q * d);
       const double bound = friction * std::max(f[d - 1], 0.0);
       clipped += std::sqrt(std::max(f.squaredNorm() - f[d - 1] * f[d - 1], 0.0)) > bound * (1 - 1e-9);
     }
   }
-  CHECK(compared > 250);
-  CHECK(rested > 50);
+  CHECK(compared > 450);
+  CHECK(rested > 100);
+  CHECK(slipped > 100);
   CHECK(moved > 10);
   CHECK(clipped > 2);
 }

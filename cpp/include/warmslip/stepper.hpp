@@ -170,6 +170,7 @@ class Stepper {
   void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
   static void note(double& error, Extent& field, double change, double size, double floor);
   bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
+  Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
   void note_temperature(const Ledger& ledger);
   void add_heat_of_error(const StepLoads& loads);
   void split(Vec coupled, Vec w, Vec theta) const;

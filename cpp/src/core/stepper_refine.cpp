@@ -56,7 +56,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     posed_.rigid = rigid_load_;
     posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
     again = contact;
-    if (!(apply ? solve_contact(contact.force, again) : respond(correction, again))) return false;
+    if (!(apply ? solve_contact(contact.force, again) : respond(correction + creep(contact), again))) return false;
     if (apply) free_ = posed_.free;
     change = again;
     change.force = again.added;
@@ -176,6 +176,24 @@ bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& 
   return found != 0;
 }
 
+// The slip of points that stick, (d points), of which the solver leaves some where their nodes are not points themselves:
+// it is little beside the motion that the contact stops, and may be much beside the straining that is left.
+template <int d>
+Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
+  bool apart = false;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) apart = apart || surface_.own_node(i) < 0;
+  if (!apart) return Eigen::VectorXd::Zero(surface_.points() * d);
+  Eigen::VectorXd out = surface_.at_points(surface_.nodal_values(next_.w));
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Point<d> nu = surface_.normals().row(i).transpose();
+    auto slip = out.template segment<d>(i * d);
+    const bool sticks = contact.status[static_cast<std::size_t>(i)] == Status::stick &&
+                        posed_.law(static_cast<std::size_t>(i)).friction.regularisation == 0;
+    slip = sticks ? Point<d>(slip - slip.dot(nu) * nu) : Point<d>(Point<d>::Zero());
+  }
+  return out;
+}
+
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
 template <int d>
 Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
@@ -189,7 +207,11 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
-  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
+  const auto creeps = [&] {
+    return contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
+  };
+  for (int pass = 0;
+       momentum_ && pass < options_.passes && (!done(motion(), errors_.largest()) || (pass == 0 && creeps())); ++pass) {
     const double rest = motion(), error = errors_.largest();
     if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
       react(inputs(loads, contact), contact);

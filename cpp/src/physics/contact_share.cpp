@@ -9,8 +9,8 @@ namespace {
 using Shape = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 // A point that shares its force with others. At rest it shares its friction, up to the bound; on a rigid foundation
-// also its pressure, of which the bound may be a multiple. A point that slips shares pressure that its friction does
-// not follow.
+// also its pressure, of which the bound may be a multiple. A point that slips there shares pressure, and its friction
+// follows; in space each has a direction of its own, and points that slip with friction keep the forces they have.
 template <int d>
 struct Sharing {
   Eigen::Index point;
@@ -18,7 +18,7 @@ struct Sharing {
   double bound;        // force: of the friction, at no pressure where that is shared
   double coefficient;  // friction per shared pressure
   bool rests, pressed;
-  Point<d> normal;
+  Point<d> normal, drag = Point<d>::Zero();  // the latter: friction over its bound, of a point that slips
 
   struct Projection {
     Point<d> force;
@@ -26,11 +26,17 @@ struct Sharing {
   };
   // The force, of those that it may have, that is nearest to one, and how it follows that one.
   Projection nearest(const Point<d>& to) const {
+    if (!rests) {
+      const Point<d> edge = normal + coefficient * drag, least = bound * drag;
+      const double p = (to - least).dot(edge) / edge.squaredNorm();
+      return {least + std::max(p, 0.0) * edge,
+              (p >= 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
+    }
     const Tensor2<d> across = normal * normal.transpose(), tangential = Tensor2<d>::Identity() - across;
-    const Point<d> t = rests ? Point<d>(tangential * to) : Point<d>(Point<d>::Zero());
+    const Point<d> t = tangential * to;
     const double p = pressed ? to.dot(normal) : 0, size = t.norm();
-    if (!rests || size <= bound + coefficient * std::max(p, 0.0))
-      return {t + std::max(p, 0.0) * normal, (rests ? 1.0 : 0.0) * tangential + (p > 0 ? 1.0 : 0.0) * across};
+    if (size <= bound + coefficient * std::max(p, 0.0))
+      return {t + std::max(p, 0.0) * normal, tangential + (p >= 0 ? 1.0 : 0.0) * across};
     const Point<d> way = t / size, edge = normal + coefficient * way;  // on the edge of the cone, or at its tip
     const double pressure = pressed ? std::max((p + coefficient * (size - bound)) / edge.squaredNorm(), 0.0) : 0,
                  friction = bound + coefficient * pressure;
@@ -40,21 +46,20 @@ struct Sharing {
   }
   // What it shares of a force.
   Point<d> part(const Point<d>& force) const {
-    const Point<d> pressure = force.dot(normal) * normal;
-    return (rests ? Point<d>(force - pressure) : Point<d>(Point<d>::Zero())) +
-           (pressed ? pressure : Point<d>(Point<d>::Zero()));
+    return pressed ? force : Point<d>(force - force.dot(normal) * normal);
   }
 };
 
 template <int d>
 std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactSolution<d>& solution,
                                 double tolerance) {
-  double fastest = 0, reach = 0;
+  double fastest = 0, reach = 0, largest = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const ContactPoint<d>& point = problem.points[i];
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Point<d> free = problem.free.template segment<d>(row), w = solution.velocity.template segment<d>(row);
     fastest = std::max({fastest, free.norm(), w.norm()});
+    largest = std::max(largest, solution.force.template segment<d>(row).norm());
     reach = std::max(reach, point.displacement.norm() + std::abs(point.gap) + problem.step * (free.norm() + w.norm()));
   }
   std::vector<Sharing<d>> out;
@@ -64,19 +69,28 @@ std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactS
     const Friction& friction = law.friction;
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Point<d> w = solution.velocity.template segment<d>(row), force = solution.force.template segment<d>(row);
-    const double speed = (w - w.dot(point.normal) * point.normal).norm();
-    const double pressure = std::max(force.dot(point.normal), 0.0) / point.weight;
-    const double bound = point.weight * friction.bound(pressure, speed).value;
+    const Point<d> slip = w - w.dot(point.normal) * point.normal, rub = force - force.dot(point.normal) * point.normal;
+    const double speed = slip.norm(), pressure = std::max(force.dot(point.normal), 0.0) / point.weight;
+    const double least = point.weight * friction.bound(0, speed).value,
+                 bound = point.weight * friction.bound(pressure, speed).value;
     // the power that will be missing is at most twice bound times speed
     const bool rests = friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest;
     const double r = point.penetration + problem.step * w.dot(point.normal);
     const bool pressed = law.compliance.rigid() && !point.prescribed && std::abs(r) <= tolerance * reach &&
-                         !friction.custom && friction.limit == unlimited && (rests || friction.coefficient == 0);
-    if (rests && pressed)
-      out.push_back({static_cast<Eigen::Index>(i), point.weight, point.weight * friction.cohesion, friction.coefficient,
-                     rests, pressed, point.normal});
-    else if (rests || pressed)
-      out.push_back({static_cast<Eigen::Index>(i), point.weight, bound, 0, rests, pressed, point.normal});
+                         !friction.custom && friction.limit == unlimited && (rests || d == 2 || bound == 0);
+    if (!rests && !pressed) continue;
+    Sharing<d> one{static_cast<Eigen::Index>(i), point.weight, bound, 0, rests, pressed, point.normal};
+    if (pressed) {
+      one.bound = least;
+      one.coefficient = friction.bound(1, speed).value - friction.bound(0, speed).value;
+    }
+    if (!rests) {
+      if (bound > 1e-6 * largest)
+        one.drag = rub / bound;
+      else if (speed > 0)
+        one.drag = slip / std::hypot(speed, friction.regularisation);
+    }
+    out.push_back(one);
   }
   return out;
 }
@@ -107,20 +121,18 @@ struct Dual {
     for (const auto& q : points) add(q, q.nearest(at(q, y)).force, out);
     return out;
   }
-  // its generalised derivative, with something on the diagonal for directions in which nothing rests
-  Eigen::SparseMatrix<double> curvature(const Eigen::VectorXd& y) const {
-    double heaviest = 0;
+  // its generalised derivative, with something on the diagonal
+  Eigen::SparseMatrix<double> curvature(const Eigen::VectorXd& y, double damping) const {
     std::vector<Eigen::Triplet<double>> entries;
     for (const auto& q : points) {
       const Tensor2<d> own = q.weight * q.nearest(at(q, y)).derivative;
-      heaviest = std::max(heaviest, q.weight);
       for (Shape::InnerIterator i(shape, q.point); i; ++i)
         for (Shape::InnerIterator j(shape, q.point); j; ++j)
           for (int a = 0; a < d; ++a)
             for (int b = 0; b < d; ++b)
               entries.emplace_back(i.col() * d + a, j.col() * d + b, i.value() * j.value() * own(a, b));
     }
-    for (Eigen::Index i = 0; i < asked.size(); ++i) entries.emplace_back(i, i, 1e-12 * heaviest);
+    for (Eigen::Index i = 0; i < asked.size(); ++i) entries.emplace_back(i, i, damping);
     Eigen::SparseMatrix<double> out(asked.size(), asked.size());
     out.setFromTriplets(entries.begin(), entries.end());
     return out;
@@ -147,20 +159,21 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
     dual.add(q, q.part(force), asked);
     widest = std::max({widest, q.bound, q.part(force).norm()});
   }
+  double heaviest = 0;
+  for (const auto& q : points) heaviest = std::max(heaviest, q.weight);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(asked.size()), gradient = dual.gradient(y);
-  const double enough = 8 * std::numeric_limits<double>::epsilon() * widest;
-  for (int step = 0; step < 50 && gradient.cwiseAbs().maxCoeff() > enough; ++step) {
+  const double enough = 8 * std::numeric_limits<double>::epsilon() * widest, least = 1e-12 * heaviest;
+  double damping = least;  // where nothing rests, or forces are at their bounds, the function is flat
+  for (int step = 0; step < 500 && gradient.cwiseAbs().maxCoeff() > enough; ++step) {
     const Eigen::VectorXd change =
-        -Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(dual.curvature(y)).solve(gradient);
-    const double before = dual.value(y), slope = gradient.dot(change);
-    double length = 1;
-    Eigen::VectorXd next = dual.gradient(y + change);
-    while (length > 1e-3 && !(next.norm() < gradient.norm()) &&
-           dual.value(y + length * change) > before + 1e-4 * length * slope) {
-      length /= 2;
-      next = dual.gradient(y + length * change);
-    }
-    y += length * change;
+        -Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(dual.curvature(y, damping)).solve(gradient);
+    const Eigen::VectorXd next = dual.gradient(y + change);
+    const double promised = 0.5 * (damping * change.squaredNorm() - gradient.dot(change)),
+                 gained = -0.5 * (gradient + next).dot(change);  // by the trapezoidal rule, without cancellation
+    if (gained < 0.25 * promised) damping *= 8;
+    if (gained > 0.75 * promised) damping = std::max(least, damping / 8);
+    if (!(gained > 1e-4 * promised)) continue;
+    y += change;
     gradient = next;
   }
   if (!(gradient.cwiseAbs().maxCoeff() <= 0.5 * tolerance * widest)) return false;
