@@ -131,7 +131,9 @@ def pressed(d: int, friction: float) -> Callable[[Units], Any]:
             length=units.length,
             time={"end": units.time, "steps": 20},
             elasticity=elasticity(d, 100.0 * units.stress, 0.3),
-            supports={"displacement": {"top": along(d, f"-{0.02 * units.length!r} * {t}", f"{0.1 * units.length!r} * {t}")}},
+            supports={
+                "displacement": {"top": along(d, f"-{0.02 * units.length!r} * {t}", f"{0.1 * units.length!r} * {t}")}
+            },
             contact={
                 "part": "bottom",
                 "gap": f"{0.01 * units.length!r} * sin(8 * {x} + 3 * {t})**2",

@@ -176,8 +176,8 @@ bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& 
   return found != 0;
 }
 
-// The slip of points that stick, (d points), of which the solver leaves some where their nodes are not points themselves:
-// it is little beside the motion that the contact stops, and may be much beside the straining that is left.
+// The slip of points that stick, (d points), of which the solver leaves some where their nodes are not points
+// themselves: it is little beside the motion that the contact stops, and may be much beside the straining that is left.
 template <int d>
 Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   bool apart = false;
@@ -207,9 +207,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
-  const auto creeps = [&] {
-    return contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
-  };
+  const auto creeps = [&] { return contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining; };
   for (int pass = 0;
        momentum_ && pass < options_.passes && (!done(motion(), errors_.largest()) || (pass == 0 && creeps())); ++pass) {
     const double rest = motion(), error = errors_.largest();

@@ -29,8 +29,7 @@ struct Sharing {
     if (!rests) {
       const Point<d> edge = normal + coefficient * drag, least = bound * drag;
       const double p = (to - least).dot(edge) / edge.squaredNorm();
-      return {least + std::max(p, 0.0) * edge,
-              (p >= 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
+      return {least + std::max(p, 0.0) * edge, (p >= 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
     }
     const Tensor2<d> across = normal * normal.transpose(), tangential = Tensor2<d>::Identity() - across;
     const Point<d> t = tangential * to;
@@ -45,9 +44,7 @@ struct Sharing {
                 (pressure > 0 ? 1 / edge.squaredNorm() : 0.0) * edge * edge.transpose()};
   }
   // What it shares of a force.
-  Point<d> part(const Point<d>& force) const {
-    return pressed ? force : Point<d>(force - force.dot(normal) * normal);
-  }
+  Point<d> part(const Point<d>& force) const { return pressed ? force : Point<d>(force - force.dot(normal) * normal); }
 };
 
 template <int d>
