@@ -140,13 +140,19 @@ class Stepper {
     Eigen::VectorXd given;
   };
 
+  struct Motion {
+    VecHandle w, strained_w, theta;
+    Eigen::VectorXd rigid, free;
+    ContactSolution<d> contact;
+  };
+
   void take_state();
   StepReport<d> attempt(const StepLoads& loads);
   void take_factors();
   void take_motion(Mat a, int width, Symmetry symmetry, const std::string& name);
   std::vector<std::string> parts_in_contact(bool mechanical) const;
   void take_vectors();
-  void momentum_right_side(const StepLoads& loads);
+  void momentum_right_side(const StepLoads& loads, const Eigen::VectorXd& from);
   Eigen::VectorXd reduce(Vec right, Vec external);
   Eigen::VectorXd expand(const ContactSolution<d>& contact, Vec w, Vec theta);
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
@@ -156,6 +162,8 @@ class Stepper {
   void react(const StepInputs& inputs, ContactSolution<d>& contact);
   void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
+  bool reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact);
+  void finish_motion(const Eigen::VectorXd& from, const ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside, Vec out);
   NodalFlow flow(const StepLoads& loads, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) const;
@@ -170,6 +178,8 @@ class Stepper {
   void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
   static void note(double& error, Extent& field, double change, double size, double floor);
   bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
+  Motion motion_of(const ContactSolution<d>& contact) const;
+  void take_back(const Motion& motion, ContactSolution<d>& contact);
   Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
   void note_temperature(const Ledger& ledger);
   void add_heat_of_error(const StepLoads& loads);

@@ -236,7 +236,11 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
         force.add(position, external, moved + given + rigid_share_ * (magnitude - moved - given));
         const double rest = left.allFinite() ? size(left) : std::numeric_limits<double>::infinity();
         raise(defect, rest);
-        if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / magnitude);
+        // a point at rest has a strain rate of rounding of the rigid motion, which it stops
+        const double least = after.strained && surface_.points() > 0
+                                 ? 1e-5 * w_both * (in.k * row(elastic_rows_) + row(viscous_rows_))
+                                 : 0;
+        if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / (magnitude + least));
       }
       work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
       if (fixed) continue;

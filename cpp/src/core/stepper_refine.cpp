@@ -194,6 +194,30 @@ Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   return out;
 }
 
+// The velocity (and, monolithic, the temperature) of the step with its contact, to go back to.
+template <int d>
+typename Stepper<d>::Motion Stepper<d>::motion_of(const ContactSolution<d>& contact) const {
+  const auto copy = [](Vec from) {
+    VecHandle to;
+    if (!from) return to;
+    to = duplicate(from);
+    WARMSLIP_PETSC(VecCopy(from, to));
+    return to;
+  };
+  return {copy(next_.w), copy(next_.strained_w), monolithic() ? copy(next_.theta) : VecHandle(), next_.rigid, free_,
+          contact};
+}
+
+template <int d>
+void Stepper<d>::take_back(const Motion& motion, ContactSolution<d>& contact) {
+  WARMSLIP_PETSC(VecCopy(motion.w, next_.w));
+  if (motion.strained_w) WARMSLIP_PETSC(VecCopy(motion.strained_w, next_.strained_w));
+  if (motion.theta) WARMSLIP_PETSC(VecCopy(motion.theta, next_.theta));
+  next_.rigid = motion.rigid;
+  free_ = motion.free;
+  contact = motion.contact;
+}
+
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
 template <int d>
 Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
@@ -211,6 +235,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   for (int pass = 0;
        momentum_ && pass < options_.passes && (!done(motion(), errors_.largest()) || (pass == 0 && creeps())); ++pass) {
     const double rest = motion(), error = errors_.largest();
+    const Motion before = motion_of(contact);
     if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
       react(inputs(loads, contact), contact);
       ledger = balance(complete(loads, contact));
@@ -219,6 +244,11 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     ledger = balance(complete(loads, contact));
     ++cost_.refinements;
     refined = true;
+    if (!(motion() <= 2 * std::max(rest, enough))) {  // it did harm
+      take_back(before, contact);
+      ledger = balance(complete(loads, contact));
+      break;
+    }
     if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
   }
   for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {

@@ -42,13 +42,16 @@ void Stepper<d>::fix(Vec v, const std::vector<PetscInt>& indices, Vec given, dou
 
 // f + rho M w_{n-1} / k - A u_{n-1} + G theta_{n-1}, less what moving supports pull
 template <int d>
-void Stepper<d>::momentum_right_side(const StepLoads& loads) {
+void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::VectorXd& from) {
   const double k = options_.k;
   const Vec out = momentum_right_;
   WARMSLIP_PETSC(VecCopy(loads.force, out));
   if (now_.momentum && rigid_.empty()) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
-  if (now_.momentum && !rigid_.empty()) {  // seen from the rigid motion so far, whose digits are then none of its own
-    multiply(operators_.inertia, now_.strained_w, correction_w_);
+  if (now_.momentum && !rigid_.empty()) {
+    const Vec seen = next_.strained_w;
+    WARMSLIP_PETSC(VecCopy(now_.strained_w, seen));
+    rigid_.carry(now_.rigid - from, seen);
+    multiply(operators_.inertia, seen, correction_w_);
     WARMSLIP_PETSC(VecAXPY(out, 1 / k, correction_w_));
   }
   if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
@@ -151,34 +154,60 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
   return solution.converged;
 }
 
-// Velocity (and, monolithic, temperature) of the step. Returns whether contact was solved for.
+// Velocity (and, monolithic, temperature) of the step. Returns whether contact was solved for. A body without supports
+// is seen from its rigid motion so far, whose digits are then none of its own, and from rest where the contact stops it:
+// the two motions would cancel.
 template <int d>
 bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contact) {
+  const Eigen::VectorXd& moved = now_.rigid;
+  if (reach_motion(loads, moved, contact)) {
+    if (moved.isZero(0) || contact.force.isZero(0) || (moved + contact.rigid).norm() > 1e-3 * moved.norm()) {
+      finish_motion(moved, contact);
+      return true;
+    }
+  } else if (!contact_ || moved.isZero(0) || !in_range(free_)) {
+    return false;
+  }
+  ContactSolution<d> again;
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(moved.size());
+  const bool stopped = reach_motion(loads, rest, again);
+  if (!stopped && !(contact.converged && reach_motion(loads, moved, contact))) return false;
+  if (stopped) contact = std::move(again);
+  finish_motion(stopped ? rest : moved, contact);
+  return true;
+}
+
+// The contact of the step, seen from the rigid motion `from`.
+template <int d>
+bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact) {
   {
     const Timed part(cost_.momentum_seconds);
-    momentum_right_side(loads);
+    momentum_right_side(loads, from);
     if (monolithic()) {
       heat_right_side(loads, nullptr, coupled_scale_);
       join(momentum_right_, heat_right_, coupled_right_);
     }
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
-    if (contact_ && !rigid_.empty()) free_ += carried_ * now_.rigid;
+    if (contact_ && !rigid_.empty()) free_ += carried_ * from;
   }
-  if (contact_) {
-    if (!in_range(free_)) return false;
-    posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
-    if (!solve_contact(contact_force_, contact)) return false;
-  }
+  if (!contact_) return true;
+  if (!in_range(free_)) return false;
+  posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
+  return solve_contact(contact_force_, contact);
+}
+
+// What follows from it.
+template <int d>
+void Stepper<d>::finish_motion(const Eigen::VectorXd& from, const ContactSolution<d>& contact) {
   const Timed part(cost_.momentum_seconds);
   if (rigid_.empty()) {
     expand(contact, next_.w, next_.theta);
   } else {
-    next_.rigid = now_.rigid + expand(contact, next_.strained_w, next_.theta);
+    next_.rigid = from + expand(contact, next_.strained_w, next_.theta);
     WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
     rigid_.carry(next_.rigid, next_.w);
   }
   if (contact_) settle(contact, next_.w, next_.strained_w);
-  return true;
 }
 
 // Heat that the contact leads or makes is known at the contact points alone: as power that a node loses by what it is
