@@ -83,6 +83,18 @@ def _rough(scene: Scene) -> Iterator[str]:
                 f"the friction coefficient of '{contact.part}' is {friction.coefficient:g}: dry solids have 0.1 to 1, and above "
                 f"{FRICTION:g} a step may have several answers; check {key}.friction.coefficient"
             )
+        inertial = scene.inertia is not None and scene.inertia.density > 0
+        if (
+            inertial
+            and friction is not None
+            and friction.kinetic is not None
+            and friction.kinetic < friction.coefficient
+        ):
+            yield (
+                f"the friction coefficient of '{contact.part}' falls from {friction.coefficient:g} to {friction.kinetic:g} over "
+                f"a slip speed of {friction.speed:g}, which may feed vibrations: rounding then grows from step to step, and the "
+                "digits are those of single steps; compare with a run whose mesh.lengths differ by 1e-12"
+            )
 
 
 def _absolute(scene: Scene) -> Iterator[str]:

@@ -83,6 +83,10 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
     (body(WARM, contact__heat_exchange__foundation_temperature=20.0), "nothing acts: there is no load"),
     (body(WARM, contact__heat_exchange__foundation_temperature=21.0), None),
     (body(PRESSED, contact__friction__coefficient=2.5), "the friction coefficient of 'bottom' is 2.5: dry solids have"),
+    (
+        body(FALLING, contact__friction={"coefficient": 0.5, "kinetic": 0.1, "speed": 0.2}),
+        "the friction coefficient of 'bottom' falls from 0.5 to 0.1 over a slip speed of 0.2, which may feed",
+    ),
     (body(PRESSED, contact__gap="0.001 * (x - 0.5)"), "the gap of 'bottom' is -0.0005 at its nearest point at t = 0"),
     (body(PRESSED, contact__gap="0.001 * abs(x - 0.5)"), None),
     (body(PRESSED, contact__gap="-0.001 * t"), None),
@@ -153,6 +157,12 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
     ),
     (body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, 0.49]]}), None),
 ]
+
+
+def test_friction_that_does_not_fall_or_moves_no_mass_feeds_nothing() -> None:
+    for base, kinetic in ((FALLING, 0.5), (PRESSED, 0.1)):
+        friction = {"coefficient": 0.5, "kinetic": kinetic, "speed": 0.2}
+        assert not [one for one in plausibility.of_scene(body(base, contact__friction=friction)) if "feed" in one]
 
 
 @pytest.mark.parametrize(("scene", "words"), BEFORE, ids=[f"{i}" for i in range(len(BEFORE))])

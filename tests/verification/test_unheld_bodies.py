@@ -146,6 +146,85 @@ def a_push_that_friction_resists(d: int) -> None:
                     assert np.abs(force - wanted).max() <= 1e-9 * np.abs(wanted).max()
 
 
+@check
+def a_stiff_body_on_a_soft_layer(d: int) -> None:
+    """Two million times stiffer: what the contact bears is the load, and a support beside it changes no digits."""
+    load = 1e4
+    one = scene(
+        d,
+        [4] * d,
+        length=0.1,
+        time={"end": 0.1, "steps": 3},
+        elasticity=elasticity(d, 2.1e11, 0.3),
+        regions={"layer": {"where": f"{'y' if d == 2 else 'z'} < 0.05005", "elasticity": elasticity(d, 1e5, 0.1)}},
+        loads={"traction": {"top": along(d, -load, 0.1 * load)}},
+        contact={"part": "bottom", "stiffness": 1e9, "friction": {"coefficient": 0.4}},
+    )
+    for scale in (1.0, 1.27e3, 0.0321):
+        job = right(
+            one.override(
+                **{
+                    "mesh.lengths": [0.1 * scale] * d,
+                    "regions.layer.where": f"{'y' if d == 2 else 'z'} < {0.05005 * scale!r}",
+                    "contact.stiffness": 1e9 / scale,
+                }
+            ),
+            digits=6.0,
+        )
+        force = np.reshape(job.stepper.contact_force, (-1, d)).sum(axis=0)
+        wanted = np.array(along(d, -load, 0.1 * load)) * (0.1 * scale) ** (d - 1)
+        assert np.abs(force - wanted).max() <= 1e-11 * load * (0.1 * scale) ** (d - 1)
+
+
+@check
+def friction_stops_it_in_one_long_step(d: int) -> None:
+    """A speed that would take it far away, against none after the step: statics with the momentum as a load."""
+    for step in (10.0, 60.0, 3600.0):
+        weight, speed, density = 77008.5, 1.0, 7850.0
+        moving = scene(
+            d,
+            [4] + [2] * (d - 1),
+            length=0.2,
+            time={"end": step, "steps": 1},
+            inertia={"density": density},
+            elasticity=elasticity(d, 2.1e11, 0.3),
+            loads={"body": along(d, -weight, 0.2 * weight)},
+            initial={"velocity": along(d, 0.0, speed)},
+            contact={"part": "bottom", "stiffness": 1e14, "friction": {"coefficient": 0.4}},
+        )
+        pushed = moving.override(
+            **{"initial.velocity": [0.0] * d, "loads.body": along(d, -weight, 0.2 * weight + density * speed / step)}
+        )
+        ways = [np.reshape(right(one).stepper.contact_force, (-1, d)) for one in (moving, pushed)]
+        sums = [force.sum(axis=0) for force in ways]
+        assert np.abs(sums[0] - sums[1]).max() <= 1e-11 * np.abs(sums[1]).max()
+        if d == 2:  # in space several solutions are near
+            assert np.abs(ways[0] - ways[1]).max() <= 1e-9 * np.abs(ways[1]).max()
+
+
+@check
+def what_held_it_lets_it_fly(d: int) -> None:
+    """A constant friction bound acts without pressure: it calms a falling body until nothing but its fall is left."""
+    n, steps, end = (24, 24, 0.00424) if d == 2 else (4, 24, 0.02)
+    for density, young in ((917.0, 9e9), (600.0, 1e10)):
+        job = Run(
+            scene(
+                d,
+                n,
+                length=0.1,
+                time={"end": end, "steps": steps},
+                inertia={"density": density},
+                elasticity=elasticity(d, young, 0.33),
+                loads={"body": along(d, -9.81 * density)},
+                initial={"velocity": along(d, -0.1, 0.1)},
+                contact={"part": "bottom", "stiffness": "rigid", "gap": 0.1, "friction": {"cohesion": 3e4}},
+            )
+        )
+        assert len(list(job.steps())) == steps, job.failure
+        momentum = job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
+        assert momentum[-1] == pytest.approx(density * 0.1**d * (-0.1 - 9.81 * end), rel=1e-12)
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 

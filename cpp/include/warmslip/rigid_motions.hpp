@@ -34,10 +34,11 @@ class RigidMotions {
   RigidMotions() = default;
   /// Rigid motions (block d) or constants (block 1) of the parts of the mesh that hang together and have no node in the
   /// `fixed` parts; displacement by x - centre over the size of the part, dimensionless. The operator has `width`
-  /// unknowns a node, those of the motion first. `avoid`: nodes that get no spring where others will do.
+  /// unknowns a node, those of the motion first. `avoid`: nodes that get no spring where others will do; `firmness`
+  /// (nodes of the mesh): how much the inner forces resist a relative motion there, in any unit.
   template <int d>
   RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
-               const std::vector<std::string>& avoid);
+               const std::vector<std::string>& avoid, const Eigen::VectorXd& firmness);
 
   bool empty() const { return motions_.empty(); }
   Eigen::Index count() const { return static_cast<Eigen::Index>(motions_.size()); }

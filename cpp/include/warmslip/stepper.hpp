@@ -163,12 +163,12 @@ class Stepper {
   void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   bool reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact);
-  void finish_motion(const Eigen::VectorXd& from, const ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside, Vec out);
   NodalFlow flow(const StepLoads& loads, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) const;
   Ledger balance(const StepInputs& inputs);
   Errors weighed() const;
+  bool closed(const Ledger& ledger) const;
   Outcome judge(const Ledger& ledger) const;
   std::string why(Outcome outcome, const Ledger& ledger) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);

@@ -1,6 +1,7 @@
 #include "warmslip/rigid_motions.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace warmslip {
@@ -67,7 +68,7 @@ void put_part(Vec part, Vec whole) {
 
 template <int d>
 RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
-                           const std::vector<std::string>& avoid)
+                           const std::vector<std::string>& avoid, const Eigen::VectorXd& firmness)
     : right_(layout.vector(width)) {
   const Mesh<d>& mesh = layout.mesh();
   const std::vector<Index> root = connected(mesh);
@@ -96,15 +97,20 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const 
       motions_.push_back(layout.vector(block));
       layout.distribute(values, motions_.back());
     }
-    // springs where they hold the motions best: rows of Z by pivoting, on the nodes that are not avoided if they
-    // suffice
-    Eigen::MatrixXd candidates = z;
+    // springs where they hold the motions best, which in soft nodes they do not: rows of Z by pivoting, on the nodes
+    // that are not avoided if they suffice
+    Eigen::MatrixXd weighted = z;
+    double firmest = 0;
+    for (const Index node : nodes) firmest = std::max(firmest, firmness[node]);
+    for (std::size_t i = 0; firmest > 0 && i < nodes.size(); ++i)
+      weighted.middleRows(static_cast<Eigen::Index>(i) * block, block) *= std::sqrt(firmness[nodes[i]] / firmest);
+    Eigen::MatrixXd candidates = weighted;
     for (std::size_t i = 0; i < nodes.size(); ++i)
       if (avoided[static_cast<std::size_t>(nodes[i])])
         candidates.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(candidates.transpose());
     if (qr.rank() < several || std::abs(qr.maxPivot()) > 1e3 * std::abs(qr.matrixR()(several - 1, several - 1)))
-      qr.compute(z.transpose());
+      qr.compute(weighted.transpose());
     for (Eigen::Index j = 0; j < several; ++j) {
       const Eigen::Index row = qr.colsPermutation().indices()[j];
       springs_.push_back(layout.global_of(nodes[static_cast<std::size_t>(row / block)]) * width +
@@ -229,8 +235,8 @@ Eigen::VectorXd RigidMotions::remove(Vec x) const {
 void RigidMotions::carry(const Eigen::VectorXd& motions, Vec x) const { combine(motions_, motions, x); }
 
 template RigidMotions::RigidMotions(const Layout<2>&, int, int, const std::vector<std::string>&,
-                                    const std::vector<std::string>&);
+                                    const std::vector<std::string>&, const Eigen::VectorXd&);
 template RigidMotions::RigidMotions(const Layout<3>&, int, int, const std::vector<std::string>&,
-                                    const std::vector<std::string>&);
+                                    const std::vector<std::string>&, const Eigen::VectorXd&);
 
 }  // namespace warmslip

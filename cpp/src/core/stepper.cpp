@@ -121,15 +121,18 @@ Ledger Stepper<d>::balance(const StepInputs& inputs) {
   return books_.close(now_, next_, inputs);
 }
 
+template <int d>
+bool Stepper<d>::closed(const Ledger& l) const {
+  const double bound = options_.identity_bound;
+  return l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
+}
+
 // Only a step that closes its books becomes the state.
 template <int d>
 Outcome Stepper<d>::judge(const Ledger& l) const {
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.viscous + l.load_work + l.conducted + l.heat_change))
     return Outcome::not_finite;
-  const double bound = options_.identity_bound;
-  const bool closed =
-      l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
-  if (!closed) return Outcome::identity_violated;
+  if (!closed(l)) return Outcome::identity_violated;
   return weighed().largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
 }
 

@@ -181,15 +181,18 @@ bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& 
 template <int d>
 Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   bool apart = false;
-  for (Eigen::Index i = 0; i < surface_.points(); ++i) apart = apart || surface_.own_node(i) < 0;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i)
+    apart = apart || (surface_.own_node(i) < 0 && !surface_.prescribed(i));
   if (!apart) return Eigen::VectorXd::Zero(surface_.points() * d);
   Eigen::VectorXd out = surface_.at_points(surface_.nodal_values(next_.w));
+  const double tolerated = options_.contact.tolerance * std::max(largest_entry(out), largest_entry(free_));
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose();
     auto slip = out.template segment<d>(i * d);
-    const bool sticks = contact.status[static_cast<std::size_t>(i)] == Status::stick &&
+    const bool sticks = contact.status[static_cast<std::size_t>(i)] == Status::stick && !surface_.prescribed(i) &&
                         posed_.law(static_cast<std::size_t>(i)).friction.regularisation == 0;
-    slip = sticks ? Point<d>(slip - slip.dot(nu) * nu) : Point<d>(Point<d>::Zero());
+    slip -= slip.dot(nu) * nu;
+    if (!sticks || slip.norm() > tolerated) slip.setZero();  // without a bound it sticks and slips as it likes
   }
   return out;
 }
@@ -231,11 +234,17 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
-  const auto creeps = [&] { return contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining; };
-  for (int pass = 0;
-       momentum_ && pass < options_.passes && (!done(motion(), errors_.largest()) || (pass == 0 && creeps())); ++pass) {
+  const bool creeps = contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
+  if (creeps && correct_motion(loads, ledger, contact, true)) {
+    ledger = balance(complete(loads, contact));
+    ++cost_.refinements;
+    errors_ = {};
+    for (Extent* field : extents_.all()) field->tried = 0;
+  }
+  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
     const double rest = motion(), error = errors_.largest();
     const Motion before = motion_of(contact);
+    const bool was_closed = closed(ledger);
     if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
       react(inputs(loads, contact), contact);
       ledger = balance(complete(loads, contact));
@@ -244,7 +253,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     ledger = balance(complete(loads, contact));
     ++cost_.refinements;
     refined = true;
-    if (!(motion() <= 2 * std::max(rest, enough))) {  // it did harm
+    if (was_closed && !closed(ledger)) {  // it did harm
       take_back(before, contact);
       ledger = balance(complete(loads, contact));
       break;

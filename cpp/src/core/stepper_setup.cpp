@@ -15,6 +15,18 @@ double largest_diagonal(Mat a) {
   return largest;
 }
 
+// The largest of a quantity of the materials at every node of the mesh.
+template <int d, class Quantity>
+Eigen::VectorXd at_nodes(const Problem<d>& problem, Quantity&& quantity) {
+  const Mesh<d>& mesh = *problem.mesh;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(mesh.nodes.rows());
+  for (Index cell = 0; cell < mesh.cells.rows(); ++cell) {
+    const double here = quantity(problem.material(cell));
+    for (const Index node : mesh.cells.row(cell)) out[node] = std::max(out[node], here);
+  }
+  return out;
+}
+
 }  // namespace
 
 template <int d>
@@ -52,7 +64,10 @@ std::vector<std::string> Stepper<d>::parts_in_contact(bool mechanical) const {
 template <int d>
 void Stepper<d>::take_motion(Mat a, int width, Symmetry symmetry, const std::string& name) {
   if (operators_.elasticity || operators_.viscosity)
-    rigid_ = RigidMotions(layout_, d, width, problem_.clamped, parts_in_contact(true));
+    rigid_ = RigidMotions(
+        layout_, d, width, problem_.clamped, parts_in_contact(true), at_nodes(problem_, [&](const Material<d>& m) {
+          return (m.elasticity ? options_.k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
+        }));
   if (!rigid_.empty()) rigid_.add_springs(a);
   momentum_ = factor(a, surface_.unknowns(width), symmetry, width, name, options_.backend);
   if (rigid_.empty()) return;
@@ -85,7 +100,9 @@ void Stepper<d>::take_factors() {
       // a capacity and an exchange that hold the constant temperature beside the conduction need no help
       const double storing = largest_diagonal(operators_.mass) / k + largest_diagonal(operators_.exchange);
       if (storing < 0.1 * largest_diagonal(operators_.conductivity))
-        constants_ = RigidMotions(layout_, 1, 1, problem_.cooled, parts_in_contact(false));
+        constants_ = RigidMotions(
+            layout_, 1, 1, problem_.cooled, parts_in_contact(false),
+            at_nodes(problem_, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
       if (!constants_.empty()) constants_.add_springs(h);
       const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
       heat_ = factor(h, apart, problem_.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,

@@ -155,25 +155,25 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
 }
 
 // Velocity (and, monolithic, temperature) of the step. Returns whether contact was solved for. A body without supports
-// is seen from its rigid motion so far, whose digits are then none of its own, and from rest where the contact stops it:
-// the two motions would cancel.
+// is seen from its rigid motion so far, whose digits are then none of its own. Where contact stops it in a long step
+// the two motions cancel, and it is seen from rest.
 template <int d>
 bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contact) {
-  const Eigen::VectorXd& moved = now_.rigid;
-  if (reach_motion(loads, moved, contact)) {
-    if (moved.isZero(0) || contact.force.isZero(0) || (moved + contact.rigid).norm() > 1e-3 * moved.norm()) {
-      finish_motion(moved, contact);
-      return true;
-    }
-  } else if (!contact_ || moved.isZero(0) || !in_range(free_)) {
-    return false;
+  Eigen::VectorXd from = now_.rigid;
+  if (!reach_motion(loads, from, contact)) {
+    if (from.isZero(0) || !in_range(free_)) return false;
+    from.setZero();
+    if (!reach_motion(loads, from, contact)) return false;
   }
-  ContactSolution<d> again;
-  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(moved.size());
-  const bool stopped = reach_motion(loads, rest, again);
-  if (!stopped && !(contact.converged && reach_motion(loads, moved, contact))) return false;
-  if (stopped) contact = std::move(again);
-  finish_motion(stopped ? rest : moved, contact);
+  const Timed part(cost_.momentum_seconds);
+  if (rigid_.empty()) {
+    expand(contact, next_.w, next_.theta);
+  } else {
+    next_.rigid = from + expand(contact, next_.strained_w, next_.theta);
+    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
+    rigid_.carry(next_.rigid, next_.w);
+  }
+  if (contact_) settle(contact, next_.w, next_.strained_w);
   return true;
 }
 
@@ -194,20 +194,6 @@ bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& fro
   if (!in_range(free_)) return false;
   posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
   return solve_contact(contact_force_, contact);
-}
-
-// What follows from it.
-template <int d>
-void Stepper<d>::finish_motion(const Eigen::VectorXd& from, const ContactSolution<d>& contact) {
-  const Timed part(cost_.momentum_seconds);
-  if (rigid_.empty()) {
-    expand(contact, next_.w, next_.theta);
-  } else {
-    next_.rigid = from + expand(contact, next_.strained_w, next_.theta);
-    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
-    rigid_.carry(next_.rigid, next_.w);
-  }
-  if (contact_) settle(contact, next_.w, next_.strained_w);
 }
 
 // Heat that the contact leads or makes is known at the contact points alone: as power that a node loses by what it is
