@@ -310,7 +310,8 @@ def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
 SAID = {
     **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
     "brake_pad": [
-        "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution"
+        "the friction coefficient of 'bottom' falls from 0.4 to 0.3 over a slip speed of 0.5, which may feed vibrations",
+        "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution",
     ],
     "block_with_hole": ["the largest strain is 23.3 %"],
     "creep_column": ["the body sinks into the foundation by 0.0882, 4.4 %"],
