@@ -51,12 +51,12 @@ struct Ledger {
 
 struct StepInputs {
   double k;
-  Vec force, heat;                 ///< load vectors
-  Vec expansion_theta, heating_w;  ///< the ones the coupling used
-  Vec coupling_theta, coupling_w;  ///< the temperature of the former and the velocity of the latter
-  Eigen::VectorXd contact_force;   ///< at the points, (d points)
-  Eigen::VectorXd contact_free;    ///< velocity the points would have without contact, for the size of its terms
-  Eigen::VectorXd foundation;      ///< theta_F at the points, where the conductance depends on the pressure
+  Vec force, heat;                    ///< load vectors
+  Vec expansion_theta, heating_w;     ///< the ones the coupling used
+  double coupling_theta, coupling_w;  ///< largest temperature of the former and straining velocity of the latter
+  Eigen::VectorXd contact_force;      ///< at the points, (d points)
+  Eigen::VectorXd contact_free;       ///< velocity the points would have without contact, for the size of its terms
+  Eigen::VectorXd foundation;         ///< theta_F at the points, where the conductance depends on the pressure
 };
 
 template <int d>
@@ -68,8 +68,9 @@ class Bookkeeper {
   /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
   void rigid_share(double share) { rigid_share_ = share; }
 
-  /// Closes the books of the step from `before` to `after` (collective).
-  Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+  /// Closes the books of the step from `before` to `after` (collective); `magnitudes`: keeps those that `add_rounding`
+  /// asks for.
+  Ledger close(const Level& before, const Level& after, const StepInputs& inputs, bool magnitudes = false);
 
   /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`,
   /// where given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
@@ -115,6 +116,7 @@ class Bookkeeper {
   std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
   std::vector<bool> clamped_, cooled_;      // a node
   double rigid_share_ = 1;
+  bool keeps_ = false;                         // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity
   double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature
   Point<d> centroid_;                          // moments are taken about it

@@ -73,9 +73,8 @@ std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> mo
 // Sums of nodal forces and of their moments, and of their sizes.
 template <int d>
 struct Resultant {
-  static constexpr int moments = d == 2 ? 1 : 3;
-  Eigen::Matrix<double, d + moments, 1> sum = Eigen::Matrix<double, d + moments, 1>::Zero();
-  Eigen::Matrix<double, d + moments, 1> size = Eigen::Matrix<double, d + moments, 1>::Zero();
+  static constexpr int moments = d == 2 ? 1 : 3, many = d + moments;
+  Eigen::Vector<double, many> sum = Eigen::Vector<double, many>::Zero(), size = sum;
   // a force at a place, and the magnitudes of its own terms
   void add(const Point<d>& x, const Point<d>& f, double magnitude) {
     sum.template head<d>() += f;
@@ -150,8 +149,9 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
 }
 
 template <int d>
-Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
+Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in, bool magnitudes) {
   Ledger ledger{};
+  keeps_ = magnitudes;
   work_magnitude_ = 0;
   if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
   multiply(operators_.conductivity, after.theta, conducted_);
@@ -199,7 +199,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   std::array<double, 6> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
-               w_both = std::max(after.sizes.w, before.sizes.w), theta = largest(in.coupling_theta);
+               w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta;
   const bool warm = theta > temperature_of_rounding(before, after, in.k);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
@@ -225,9 +225,10 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       // a force in one direction has no rounding in another, in which the body may be free to move
       const Point<d> outer =
           fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
-      force_external_.template segment<d>(i * d) = outer;
-      force_magnitudes_.template segment<d>(i * d) =
-          fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
+      if (keeps_) force_external_.template segment<d>(i * d) = outer;
+      if (keeps_)
+        force_magnitudes_.template segment<d>(i * d) =
+            fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
       if (fixed) {
         force.add(position, external - left, magnitude);
         l.support_work += in.k * left.dot(way);
@@ -250,10 +251,13 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
       raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
     }
   }
-  const Eigen::VectorXd sums = layout_.sum(Eigen::VectorXd(force.sum)),
-                        sizes = layout_.sum(Eigen::VectorXd(force.size));
-  work_magnitude_ += layout_.sum(work);
-  l.support_work = layout_.sum(l.support_work);
+  constexpr Eigen::Index many = Resultant<d>::many;
+  Eigen::VectorXd all(2 * many + 2);
+  all << force.sum, force.size, work, l.support_work;
+  all = layout_.sum(std::move(all));
+  const auto sums = all.template head<many>(), sizes = all.template segment<many>(many);
+  work_magnitude_ += all[2 * many];
+  l.support_work = all[2 * many + 1];
   most = over_ranks(layout_.comm(), most);
   l.force_residual = most[backward];
   for (Eigen::Index i = 0; i < sums.size(); ++i)
@@ -287,7 +291,7 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   enum { defect, backward, acting };
   std::array<double, 3> most{};
   const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
-  const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = largest(in.coupling_w);
+  const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = in.coupling_w;
   // a velocity that strains is known to the rounding of one that carries the body: a millionth is as far from it as
   // round-off is from the bound on a balance
   const double carried = std::max(0.0, 1e-6 * std::max(after.sizes.w, before.sizes.w) - w);
@@ -305,8 +309,8 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
                    magnitude = terms + carried * at(heating_rows_, i);
       content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
-      heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms;
-      heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
+      if (keeps_) heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms;
+      if (keeps_) heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
       if (cooled_[static_cast<std::size_t>(i)]) {
         l.held += in.k * wall * (*values)[i];
       } else {
@@ -318,7 +322,10 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
       raise(acting, std::max({(std::abs((*t1)[i]) + std::abs((*t0)[i])) / in.k, std::abs((*flux)[i]), given}));
     }
   }
-  l.held = layout_.sum(l.held);
+  Eigen::VectorXd all(4);
+  all << l.held, content, content_size, work;
+  all = layout_.sum(std::move(all));
+  l.held = all[0];
   l.heat_change = stored - stored_before;
   l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
   l.conducted = in.k * dot(after.theta, conducted_);
@@ -328,10 +335,10 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
   const double sum =
       l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating - l.friction_heating - l.held;
   most = over_ranks(layout_.comm(), most);
-  l.heat_residual = std::max({most[backward], relative(layout_.sum(content), layout_.sum(content_size)),
+  l.heat_residual = std::max({most[backward], relative(all[1], all[2]),
                               relative(sum, largest_of({stored, stored_before, l.heat_damping, l.conducted, l.exchanged,
                                                         l.supplied, l.heating, l.friction_heating, l.held}) +
-                                                layout_.sum(work))});
+                                                all[3])});
   l.heat_defect = relative(most[defect], most[acting]);
   l.temperature_scale = temperature_of_rounding(before, after, in.k);
 }

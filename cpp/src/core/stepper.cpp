@@ -94,8 +94,8 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           loads.heat,
           monolithic() ? next_.expansion_theta : now_.expansion_theta,
           options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w,
-          monolithic() ? next_.theta : now_.theta,
-          options_.coupling == Coupling::lagged ? now_.straining() : next_.straining(),
+          (monolithic() ? next_ : now_).sizes.theta,
+          (options_.coupling == Coupling::lagged ? now_ : next_).sizes.straining,
           contact.force,
           free_,
           loads.foundation};

@@ -13,6 +13,14 @@ void subtract(Mat a, double factor, Vec x, Vec scratch, Vec out) {
   WARMSLIP_PETSC(VecAXPY(out, -factor, scratch));
 }
 
+// The largest entry of this rank.
+double largest_here(Vec v) {
+  if (!v) return 0;
+  Values values(v);
+  const auto entries = *values;
+  return entries.size() ? entries.lpNorm<Eigen::Infinity>() : 0;
+}
+
 }  // namespace
 
 template <int d>
@@ -21,13 +29,10 @@ void Stepper<d>::products(Level& level) const {
   if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
   multiply(operators_.mass, level.theta, level.mass_theta);
   if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
-  const auto size = [](Vec v) {
-    PetscReal value = 0;
-    if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
-    return value;
-  };
-  level.sizes = {size(level.shape()), size(level.w), 0, size(level.theta)};
-  level.sizes.straining = level.strained_w ? size(level.strained_w) : level.sizes.w;
+  std::array<double, 4> most{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
+                             largest_here(level.theta)};
+  MPI_Allreduce(MPI_IN_PLACE, most.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
+  level.sizes = {most[0], most[1], level.strained_w ? most[2] : most[1], most[3]};
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
 }
 
