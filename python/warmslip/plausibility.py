@@ -23,7 +23,7 @@ RATIOS = (0.45, 0.49, 0.499, 0.4999)
 
 def of_scene(scene: Scene) -> list[str]:
     """What the tables alone say before a run."""
-    return [*defaults(scene), *_idle(scene), *_rough(scene), *_absolute(scene), *_locking(scene)]
+    return [*defaults(scene), *_idle(scene), *_rough(scene), *_rubbed(scene), *_absolute(scene), *_locking(scene)]
 
 
 def defaults(scene: Scene) -> Iterator[str]:
@@ -94,6 +94,19 @@ def _rough(scene: Scene) -> Iterator[str]:
                 f"the friction coefficient of '{contact.part}' falls from {friction.coefficient:g} to {friction.kinetic:g} over "
                 f"a slip speed of {friction.speed:g}, which may feed vibrations: rounding then grows from step to step, and the "
                 "digits are those of single steps; compare with a run whose mesh.lengths differ by 1e-12"
+            )
+
+
+def _rubbed(scene: Scene) -> Iterator[str]:
+    """Heat of friction that makes the body press harder."""
+    expands = scene.heat is not None and scene.heat.expansion is not None and scene.moves
+    for _, contact in contact_keys(scene):
+        heating, friction = contact.friction_heating, contact.friction
+        if expands and heating is not None and heating.share > 0 and friction is not None and friction.coefficient > 0:
+            yield (
+                f"the friction of '{contact.part}', {friction.coefficient:g}, heats a body that expands and then presses harder: "
+                "rounding may grow from step to step, and the digits are those of single steps; compare with a run whose "
+                "mesh.lengths differ by 1e-12"
             )
 
 

@@ -159,6 +159,18 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
 ]
 
 
+def test_heat_of_friction_that_expands_the_body_is_said() -> None:
+    rubs = {
+        "contact__friction_heating": {"share": 0.5},
+        "heat": {"conductivity": 1.0, "capacity": 1.0, "expansion": {"tensor": 1e-3}},
+    }
+    one = body(PRESSED, **rubs)
+    (said,) = [one for one in plausibility.of_scene(one) if "presses harder" in one]
+    assert said.startswith("the friction of 'bottom', 0.3, heats a body that expands")
+    for cured in ({"heat.expansion": None}, {"contact.friction.coefficient": 0.0}, {"contact.friction_heating": None}):
+        assert not [word for word in plausibility.of_scene(one.override(**cured)) if "presses harder" in word]
+
+
 def test_friction_that_does_not_fall_or_moves_no_mass_feeds_nothing() -> None:
     for base, kinetic in ((FALLING, 0.5), (PRESSED, 0.1)):
         friction = {"coefficient": 0.5, "kinetic": kinetic, "speed": 0.2}

@@ -114,6 +114,7 @@ class ContactSolver {
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void glue(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
   bool approach(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
+  void settle_down(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool draw(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
   OwnCompliance own(const ContactProblem<d>& problem, std::size_t point) const;

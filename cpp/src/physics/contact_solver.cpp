@@ -9,6 +9,12 @@ namespace {
 
 constexpr int few_steps = 15;  // before other scales are tried
 
+template <int d>
+bool slips_alone(const ContactSolution<d>& solution) {
+  const auto any = [&](Status status) { return std::ranges::find(solution.status, status) != solution.status.end(); };
+  return any(Status::slip) && !any(Status::stick);
+}
+
 }  // namespace
 
 template <int d>
@@ -93,6 +99,8 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     return false;
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
+  if (massive && give_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(solution)))
+    settle_down(problem, solution);
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   if (solution.converged && rigid_.count() > 0 && !massive) {
     factor(problem, linearise(problem, solution.added, solution.rigid), solution);

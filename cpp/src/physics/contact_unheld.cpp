@@ -83,6 +83,23 @@ bool ContactSolver<d>::draw(const ContactProblem<d>& problem, ContactSolution<d>
   return false;
 }
 
+// A body whose mass holds it to fewer than four digits may be held by a point that sticks: where it would be without
+// mass.
+template <int d>
+void ContactSolver<d>::settle_down(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  RigidCoupling light = rigid_;
+  light.inertia.setZero();
+  const ContactSolution<d> rest =
+      ContactSolver(compliance_, options_, light).solve(problem, total(problem, solution.added));
+  if (!rest.converged || rest.undetermined) return;
+  ContactSolution<d> held = solution;
+  held.added = rest.added;
+  held.rigid = rest.rigid / give_;
+  held.stage = Stage::restart;
+  forget();
+  if (newton(problem, true, held)) solution = std::move(held);
+}
+
 // Whether a solution that was found with something else to hold the body is held by the points alone. A point that
 // touches without a force holds nothing: the body may turn away from it. Where points slip with friction, that may
 // leave some room to the body, and this is one of several solutions.
@@ -107,6 +124,7 @@ bool ContactSolver<d>::held(const ContactProblem<d>& problem, ContactSolution<d>
 
 #define WARMSLIP_INSTANTIATE(d)                                                                  \
   template bool ContactSolver<d>::approach(const ContactProblem<d>&, bool, ContactSolution<d>&); \
+  template void ContactSolver<d>::settle_down(const ContactProblem<d>&, ContactSolution<d>&);    \
   template bool ContactSolver<d>::draw(const ContactProblem<d>&, ContactSolution<d>&);           \
   template bool ContactSolver<d>::held(const ContactProblem<d>&, ContactSolution<d>&);
 WARMSLIP_INSTANTIATE(2)
