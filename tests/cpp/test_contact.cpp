@@ -208,6 +208,20 @@ TEST_CASE_TEMPLATE("the residual vanishes exactly on the law", D, Two, Three) {
   CHECK(size(still, -k * 10 * nu) <= 1e-14);              // open
 }
 
+TEST_CASE_TEMPLATE("a number that overflowed obeys no law", D, Two, Three) {
+  constexpr int d = D::value;
+  Body<d> body = random_body<d>(5, 2, 0.3);
+  const auto s = ContactSolver<d>(body.compliance).solve(body.problem, Eigen::VectorXd::Zero(2 * d));
+  REQUIRE(s.converged);
+  Eigen::VectorXd force = s.force, velocity = s.velocity;
+  force[0] = unlimited;
+  CHECK(law_residual<d>(body.problem, force, s.velocity) == unlimited);
+  velocity[0] = unlimited;
+  CHECK(law_residual<d>(body.problem, s.force, velocity) == unlimited);
+  body.problem.points[0].displacement[0] = unlimited;
+  CHECK(law_residual<d>(body.problem, s.force, s.velocity) == unlimited);
+}
+
 TEST_CASE_TEMPLATE("a pull and a depth of rounding on a rigid foundation are a residual of rounding", D, Two, Three) {
   constexpr int d = D::value;
   Body<d> body = random_body<d>(3, 2, 0.0);

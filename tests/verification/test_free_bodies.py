@@ -182,8 +182,9 @@ def dense(operator: Any) -> Any:
     return np.column_stack(columns)
 
 
+@pytest.mark.parametrize("backend", ["automatic", "petsc"])
 @pytest.mark.parametrize("density", [1e-3, 1.0, 100.0])
-def test_an_indefinite_coupling_is_refused_and_no_other(density: float) -> None:
+def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend: str) -> None:
     """R = +M of a free body, to six digits of the size at which the coupled operator ceases to be positive definite."""
     k, unit = 0.1, 1e-3
 
@@ -208,9 +209,9 @@ def test_an_indefinite_coupling_is_refused_and_no_other(density: float) -> None:
     expansion = dense(operators.expansion) / unit
     fed = np.linalg.solve(motion, expansion @ np.linalg.solve(heat, expansion.T))
     limit = 1 / np.sqrt(np.abs(np.linalg.eigvals(fed)).max())
-    Run(coupled(limit * (1 - 1e-6)))
+    Run(coupled(limit * (1 - 1e-6)), backend=backend)
     with pytest.raises(ValueError, match="indefinite"):
-        Run(coupled(limit * (1 + 1e-6)))
+        Run(coupled(limit * (1 + 1e-6)), backend=backend)
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

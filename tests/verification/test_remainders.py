@@ -56,6 +56,26 @@ def depths_far_below_the_free_motion(d: int) -> None:
 
 
 @check
+def energy_of_a_stiff_foundation(d: int) -> None:
+    """Of depths that are rounding of the displacement, the energy is that of the forces."""
+    stiffness = 1e15
+    job = right(
+        scene(
+            d,
+            2,
+            time={"steps": 2},
+            elasticity=elasticity(d, 1.0, 0.3),
+            supports={"displacement": {"top": along(d, "-0.5 * t")}},
+            contact={"part": "bottom", "stiffness": stiffness, "gap": 0.3},
+        ),
+        digits=6.0,
+    )
+    pressing = -forces_of(job)[:, -1]
+    stored = (pressing**2 / np.asarray(job.discretisation.surface.weights)).sum() / (2 * stiffness)
+    assert pressing.sum() > 0.1 and job.report.ledger.contact == pytest.approx(stored, rel=1e-10)
+
+
+@check
 def a_body_comes_to_rest(d: int) -> None:
     """A block thrown on to a rough foundation stops: what is left of its speed is 1e-11 of it, and has all its digits."""
     for stiffness in (3e9, "rigid"):

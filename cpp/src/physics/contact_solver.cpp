@@ -9,10 +9,17 @@ namespace {
 
 constexpr int few_steps = 15;  // before other scales are tried
 
+// Whether all that friction does is to resist slip.
 template <int d>
-bool slips_alone(const ContactSolution<d>& solution) {
-  const auto any = [&](Status status) { return std::ranges::find(solution.status, status) != solution.status.end(); };
-  return any(Status::slip) && !any(Status::stick);
+bool slips_alone(const ContactProblem<d>& problem, const ContactSolution<d>& solution) {
+  bool rubs = false;
+  for (std::size_t i = 0; i < solution.status.size(); ++i) {
+    if (solution.status[i] == Status::stick) return false;
+    const Point<d> force = solution.force.template segment<d>(static_cast<Eigen::Index>(i) * d),
+                   nu = problem.points[i].normal;
+    rubs = rubs || (force - force.dot(nu) * nu).norm() > 1e-14 * solution.force.norm();
+  }
+  return rubs;
 }
 
 }  // namespace
@@ -99,7 +106,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     return false;
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
-  if (massive && give_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(solution)))
+  if (massive && give_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(problem, solution)))
     settle_down(problem, solution);
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   if (solution.converged && rigid_.count() > 0 && !massive) {

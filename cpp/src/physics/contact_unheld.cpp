@@ -89,8 +89,10 @@ template <int d>
 void ContactSolver<d>::settle_down(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   RigidCoupling light = rigid_;
   light.inertia.setZero();
+  ContactOptions quick = options_;
+  quick.fixed_point_steps = 0;
   const ContactSolution<d> rest =
-      ContactSolver(compliance_, options_, light).solve(problem, total(problem, solution.added));
+      ContactSolver(compliance_, quick, light).solve(problem, total(problem, solution.added));
   if (!rest.converged || rest.undetermined) return;
   ContactSolution<d> held = solution;
   held.added = rest.added;
