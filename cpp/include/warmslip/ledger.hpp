@@ -68,9 +68,10 @@ class Bookkeeper {
   /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
   void rigid_share(double share) { rigid_share_ = share; }
 
-  /// Closes the books of the step from `before` to `after` (collective); `magnitudes`: keeps those that `add_rounding`
-  /// asks for.
-  Ledger close(const Level& before, const Level& after, const StepInputs& inputs, bool magnitudes = false);
+  /// Closes the books of the step from `before` to `after` (collective).
+  Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+  /// Keeps the magnitudes of the equations of the step that was closed last, for `add_rounding` (collective).
+  void weigh(const Level& before, const Level& after, const StepInputs& inputs);
 
   /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`,
   /// where given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
@@ -84,6 +85,7 @@ class Bookkeeper {
   void add_rounding(Vec defect, Vec external) const;
 
  private:
+  Ledger terms(const Level& before, const Level& after, const StepInputs& inputs);
   void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
   void contact_heat(const Level& after, const StepInputs& inputs, const Eigen::VectorXd& w, Ledger& ledger);
   void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);

@@ -149,13 +149,24 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
 }
 
 template <int d>
-Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in, bool magnitudes) {
-  Ledger ledger{};
-  keeps_ = magnitudes;
-  work_magnitude_ = 0;
+Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
   if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
+  return terms(before, after, in);
+}
+
+template <int d>
+void Bookkeeper<d>::weigh(const Level& before, const Level& after, const StepInputs& in) {
+  keeps_ = true;
+  terms(before, after, in);
+  keeps_ = false;
+}
+
+template <int d>
+Ledger Bookkeeper<d>::terms(const Level& before, const Level& after, const StepInputs& in) {
+  Ledger ledger{};
+  work_magnitude_ = 0;
   if (surface_.points() > 0) contact(before, after, in, ledger);
   if (after.w) {
     forces(before, after, in, ledger);

@@ -275,7 +275,7 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   if (!wanted && !refined && !warmed) return ledger;
   const int before = substitutions();
   const bool moved = momentum_ && (refined || wanted);
-  books_.close(now_, next_, inputs(loads, contact), true);
+  books_.weigh(now_, next_, inputs(loads, contact));
   if (moved && !undetermined_) undetermined_ = !correct_motion(loads, ledger, contact, false);
   if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
   if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
