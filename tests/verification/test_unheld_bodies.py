@@ -208,31 +208,26 @@ def a_slab_that_curls_is_held_by_a_point_that_sticks(d: int) -> None:
     """Concrete in steps of two hours: its mass has no part in it, and the answer is that without mass."""
     if d == 3:
         return
-    for n, height, stiffness, cooled, coupling in (
-        ([9, 3], 0.1, 1e11, -2.0, "monolithic"),
-        ([9, 3], 0.2, "rigid", -2.0, "staggered"),
-    ):
-        length = 2 * height if stiffness != "rigid" else 1.0
-        tables = {
-            "mesh": {"shape": "square", "n": n, "lengths": [length, height]},
-            "time": {"end": 36000.0, "steps": 5, "coupling": coupling},
-            "elasticity": elasticity(d, 3e10, 0.2),
-            "heat": {"conductivity": 1.5, "capacity": 2.1e6, "expansion": {"alpha": 1e-5}},
-            "supports": {"temperature": {"top": f"{cooled} * min(1, t / 10800)"}},
-            "loads": {"body": along(d, -9.81 * 2400.0)},
-            "contact": {
-                "part": "bottom",
-                "stiffness": stiffness,
-                "friction": {"coefficient": 0.6},
-                "heat_exchange": {"conductance": 10.0},
-            },
-        }
-        heavy, light = right(build(tables | {"inertia": {"density": 2400.0}})), right(build(tables))
-        for name in ("theta", "contact force"):
-            one, other = fields(heavy)[name], fields(light)[name]
-            if name == "contact force":  # which of two like points sticks is a tie
-                one, other = one.sum(axis=0), other.sum(axis=0)
-            assert np.abs(one - other).max() <= 1e-8 * np.abs(other).max()
+    tables = {
+        "mesh": {"shape": "square", "n": [9, 3], "lengths": [0.2, 0.1]},
+        "time": {"end": 36000.0, "steps": 5, "coupling": "monolithic"},
+        "elasticity": elasticity(d, 3e10, 0.2),
+        "heat": {"conductivity": 1.5, "capacity": 2.1e6, "expansion": {"alpha": 1e-5}},
+        "supports": {"temperature": {"top": "-2 * min(1, t / 10800)"}},
+        "loads": {"body": along(d, -9.81 * 2400.0)},
+        "contact": {
+            "part": "bottom",
+            "stiffness": 1e11,
+            "friction": {"coefficient": 0.6},
+            "heat_exchange": {"conductance": 10.0},
+        },
+    }
+    heavy, light = right(build(tables | {"inertia": {"density": 2400.0}})), right(build(tables))
+    for name in ("theta", "contact force"):
+        one, other = fields(heavy)[name], fields(light)[name]
+        if name == "contact force":  # which of two like points sticks is a tie
+            one, other = one.sum(axis=0), other.sum(axis=0)
+        assert np.abs(one - other).max() <= 1e-8 * np.abs(other).max()
 
 
 @check
