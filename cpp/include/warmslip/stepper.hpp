@@ -159,7 +159,6 @@ class Stepper {
   StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
   void products(Level& level) const;
   bool solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution);
-  void react(const StepInputs& inputs, ContactSolution<d>& contact);
   void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   bool reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact);

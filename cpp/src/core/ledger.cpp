@@ -57,12 +57,6 @@ Eigen::VectorXd row_sizes(Mat a) {
   return sizes.reshaped(block, sizes.size() / block).colwise().maxCoeff().transpose();
 }
 
-double largest(Vec v) {
-  PetscReal value = 0;
-  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
-  return value;
-}
-
 // Largest of some sizes over all nodes of all ranks.
 template <std::size_t count>
 std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> most) {

@@ -112,23 +112,6 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   return true;
 }
 
-// Takes the force of points that are held by their law from the equations of their nodes, where compliances leave it
-// only as many digits as the largest force has.
-template <int d>
-void Stepper<d>::react(const StepInputs& inputs, ContactSolution<d>& contact) {
-  books_.momentum_defect(now_, next_, inputs, momentum_right_);
-  const Eigen::VectorXd left = surface_.nodal_values(momentum_right_), velocities = surface_.nodal_values(next_.w);
-  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
-    const Eigen::Index node = surface_.own_node(i);
-    const Status status = contact.status[static_cast<std::size_t>(i)];
-    if (node < 0 || status == Status::open) continue;
-    const Point<d> nu = surface_.normals().row(i).transpose(), rest = left.segment<d>(node * d),
-                   velocity = velocities.segment<d>(node * d), slip = velocity - velocity.dot(nu) * nu;
-    const bool rests = status == Status::stick && slip.norm() <= 1e-15 * velocity.norm();
-    contact.force.template segment<d>(i * d) += rests ? rest : Point<d>(rest.dot(nu) * nu);
-  }
-}
-
 template <int d>
 void Stepper<d>::note_temperature(const Ledger& ledger) {
   note(errors_.theta, extents_.theta, largest_entry(correction_theta_), largest_entry(next_.theta),
@@ -245,10 +228,6 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
     const double rest = motion(), error = errors_.largest();
     const Motion before = motion_of(contact);
     const bool was_closed = closed(ledger);
-    if (contact_ && ledger.force_defect <= enough && ledger.force_residual > enough) {
-      react(inputs(loads, contact), contact);
-      ledger = balance(complete(loads, contact));
-    }
     if (!correct_motion(loads, ledger, contact, true)) break;
     ledger = balance(complete(loads, contact));
     ++cost_.refinements;
