@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from warmslip import plausibility
+from warmslip import plausible_data
 from warmslip.consistency import contact_keys, coupling_tables
 from warmslip.expressions import constant
 from warmslip.scene import Scene
@@ -166,7 +166,7 @@ def plan(scene: Scene) -> Plan:
         missing=_missing(scene),
         suspicious=_suspicious(scene),
         assumed=_assumed(scene),
-        warnings=plausibility.of_scene(scene),
+        warnings=plausible_data.of_scene(scene),
     )
 
 

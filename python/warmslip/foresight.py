@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import plausibility as say
+from warmslip import plausible_data
 from warmslip.coupling import coupled
 from warmslip.loads import Array, Formula, evaluate, of_time
 from warmslip.loads import data as read
@@ -18,7 +19,7 @@ TIMES = 16  # at which data that depend on time are looked at
 
 def before(d: Discretisation) -> list[str]:
     """All that is to be said before the first step. Nothing of functions in Python, which are not asked without need."""
-    return [*([] if "loads" in d.own else say.of_scene(d.scene)), *_gaps(d), *_starts(d), *_coupling(d)]
+    return [*([] if "loads" in d.own else plausible_data.of_scene(d.scene)), *_gaps(d), *_starts(d), *_coupling(d)]
 
 
 def _coupling(d: Discretisation) -> list[str]:

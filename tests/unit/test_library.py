@@ -311,7 +311,7 @@ SAID = {
     **{f"paper_{reading}": ["the largest strain is 2"] for reading in ("consistent", "isotropic", "mixed", "printed")},
     "brake_pad": [
         "the friction coefficient of 'bottom' falls from 0.4 to 0.3 over a slip speed of 0.5, which may feed vibrations",
-        "the friction of 'bottom', 0.4, heats a body that expands and then presses harder: rounding may grow",
+        "the friction of 'bottom', 0.4, heats a body that expands and then presses harder: rounding may then grow",
         "the friction coefficient is 0.4, and no value of a coefficient is known up to which every step has one solution",
     ],
     "block_with_hole": ["the largest strain is 23.3 %"],

@@ -10,43 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
+from sensible import FALLING, KELVIN, PRESSED, WARM, body
 
 import warmslip
-from warmslip import Loads, Scene, estimate, explain, growth, plausibility
-from warmslip.problem import Discretisation, discretise, make_mesh
+from warmslip import Loads, Scene, estimate, explain, growth
+from warmslip.problem import Discretisation, discretise
 from warmslip.scene import build
-
-PRESSED: dict[str, Any] = {  # and nothing to say of it
-    "mesh": {"shape": "square", "n": 8},
-    "time": {"end": 1.0, "steps": 10},
-    "elasticity": {"young": 100.0, "poisson": 0.3, "assumption": "plane_strain"},
-    "supports": {"displacement": {"top": ["0.001 * t", "-0.005 * t"]}},
-    "contact": {"part": "bottom", "stiffness": 1e4, "friction": {"coefficient": 0.3}},
-}
-WARM: dict[str, Any] = {
-    "mesh": {"shape": "square", "n": 8},
-    "time": {"end": 0.1, "steps": 10},
-    "heat": {"conductivity": 1.0, "capacity": 1.0},
-    "initial": {"temperature": 20.0},
-    "contact": {
-        "part": "bottom",
-        "heat_exchange": {"conductance": 5.0, "foundation_temperature": "20 + 50 * t"},
-    },
-}
-FALLING: dict[str, Any] = {
-    "mesh": {"shape": "square", "n": 6},
-    "time": {"end": 0.5, "steps": 400},
-    "inertia": {"density": 1.0},
-    "elasticity": {"lame": [0.0, 50.0]},
-    "initial": {"velocity": [0.0, -0.1]},
-    "contact": {"part": "bottom", "stiffness": 2e3, "gap": 0.005},
-}
-KELVIN = {
-    "heat": {"conductivity": 1.0, "capacity": 1.0, "expansion": {"tensor": 1e-3}},
-    "initial": {"temperature": 293.0},
-    "supports": {"temperature": {"top": 300.0}, "displacement": ["top"]},
-    "contact": None,
-}
 
 STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
 # a column, as in test_coupling_limit, in steps of 0.54 where 0.533 is the longest that staggered ones stand
@@ -64,10 +33,6 @@ COUPLED: dict[str, Any] = {
     "supports": {"displacement": ["top"]},
     "initial": {"temperature": 1e-5},
 }
-
-
-def body(base: dict[str, Any], **keys: Any) -> Scene:
-    return build(base).override(**{key.replace("__", "."): value for key, value in keys.items()})
 
 
 def warnings(scene: Scene, **given: Any) -> list[str]:
@@ -157,24 +122,6 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
     ),
     (body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, 0.49]]}), None),
 ]
-
-
-def test_heat_of_friction_that_expands_the_body_is_said() -> None:
-    rubs = {
-        "contact__friction_heating": {"share": 0.5},
-        "heat": {"conductivity": 1.0, "capacity": 1.0, "expansion": {"tensor": 1e-3}},
-    }
-    one = body(PRESSED, **rubs)
-    (said,) = [one for one in plausibility.of_scene(one) if "presses harder" in one]
-    assert said.startswith("the friction of 'bottom', 0.3, heats a body that expands")
-    for cured in ({"heat.expansion": None}, {"contact.friction.coefficient": 0.0}, {"contact.friction_heating": None}):
-        assert not [word for word in plausibility.of_scene(one.override(**cured)) if "presses harder" in word]
-
-
-def test_friction_that_does_not_fall_or_moves_no_mass_feeds_nothing() -> None:
-    for base, kinetic in ((FALLING, 0.5), (PRESSED, 0.1)):
-        friction = {"coefficient": 0.5, "kinetic": kinetic, "speed": 0.2}
-        assert not [one for one in plausibility.of_scene(body(base, contact__friction=friction)) if "feed" in one]
 
 
 @pytest.mark.parametrize(("scene", "words"), BEFORE, ids=[f"{i}" for i in range(len(BEFORE))])
@@ -373,62 +320,6 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in job.steps():
         pass
     assert 1 <= len(gathered) <= 5
-
-
-def test_what_is_taken_for_granted() -> None:
-    shut = body(WARM, elasticity={"lame": [1.0, 1.0]}, supports={"displacement": ["top"]}, contact__stiffness=10.0)
-    assert "heat is exchanged on 'bottom' also across an open gap, with the conductance 5" in explain.plan(shut).assumed
-    both = shut.override(**{"contact.heat_exchange.per_pressure": 2.0})
-    assert any(
-        one.endswith("the conductance 5; per_pressure acts only where it touches") for one in explain.plan(both).assumed
-    )
-    only = both.override(**{"contact.heat_exchange.conductance": 0.0})
-    assert "heat is exchanged on 'bottom' only where it touches" in explain.plan(only).assumed
-    assert "the body has no stress along z: no assumption says plane_strain" in explain.plan(shut).assumed
-    assert explain.plan(body(WARM)).assumed == []  # without contact there is no gap
-    strained = body(PRESSED | KELVIN, heat__expansion={"tensor": [[1.0, 0.0], [0.0, 2.0]]})
-    assert any("mean of M_xx and M_yy" in one for one in explain.plan(strained).assumed)
-    inherits = body(WARM, heat__capacity=3.0, regions={"part": {"where": "x < 0.5", "heat": {"conductivity": 2.0}}})
-    assert "region 'part' has the capacity of the body, 3" in explain.plan(inherits).assumed
-    assert "taken for granted\n  region 'part'" in explain.text(explain.plan(inherits))
-
-
-def test_what_is_left_open_stays_open_when_a_key_is_replaced() -> None:
-    scene = body(WARM, heat={"conductivity": 1.0}).override(**{"time.steps": 3}).override(**{"mesh.n": 4})
-    assert any("the capacity is 1" in one for one in plausibility.of_scene(scene))
-
-
-def cantilever(ratio: float, mesh: dict[str, Any]) -> float:
-    """Tip displacement under a shear traction, 4 bricks in height and 20 in length, over that of beam theory with shear."""
-    space = mesh["shape"] == "cube"
-    scene = build(
-        {
-            "mesh": {"n": [20, 4, 4][: 3 if space else 2], "lengths": [5.0, 1.0, 1.0][: 3 if space else 2]} | mesh,
-            "time": {"steps": 1},
-            "elasticity": {"young": 1e3, "poisson": ratio, "assumption": "solid" if space else "plane_strain"},
-            "supports": {"displacement": ["left"]},
-            "loads": {"traction": {"right": [0.0, 0.0, 0.01] if space else [0.0, 0.01]}},
-        }
-    )
-    u, x = warmslip.run(scene).u, np.asarray(make_mesh(scene).nodes)
-    bending = 1e3 if space else 1e3 / (1 - ratio**2)
-    beam = 0.01 * (5**3 / (3 * bending / 12) + 5 * 6 / 5 / (1e3 / 2 / (1 + ratio)))
-    return float(u[x[:, 0] == 5.0][:, -1].mean() / beam)
-
-
-def test_how_much_a_cantilever_locks() -> None:
-    """The numbers that the warning and the docs give are measured; criss-cross triangles do not lock."""
-    page = (Path(__file__).parents[2] / "python/docs/howto/sensible.md").read_text()
-    for i, ratio in enumerate(plausibility.RATIOS):
-        row = [
-            cantilever(ratio, {"shape": "square"}),
-            cantilever(ratio, {"shape": "square", "diagonal": "crisscross"}),
-            cantilever(ratio, {"shape": "cube"}),
-        ]
-        assert plausibility.CANTILEVER[2][i] == pytest.approx(row[0], rel=0.02)
-        assert plausibility.CANTILEVER[3][i] == pytest.approx(row[2], rel=0.02)
-        assert row[1] > 0.9
-        assert f"| {ratio} | {row[0]:.2f} | {row[1]:.2f} | {row[2]:.2f} |" in page, (ratio, row)
 
 
 def test_a_resumed_run_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
