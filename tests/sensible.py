@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import warmslip
 from warmslip import Scene
 from warmslip.scene import build
 
@@ -42,3 +43,9 @@ KELVIN = {
 
 def body(base: dict[str, Any], **keys: Any) -> Scene:
     return build(base).override(**{key.replace("__", "."): value for key, value in keys.items()})
+
+
+def warnings(scene: Scene, **given: Any) -> list[str]:
+    done = warmslip.run(scene, **given)
+    assert done.right, done.summary["failure"]
+    return list(done.summary["warnings"])
