@@ -214,6 +214,31 @@ def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend:
         Run(coupled(limit * (1 + 1e-6)), backend=backend)
 
 
+@pytest.mark.parametrize("backend", ["automatic", "petsc"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_an_indefinite_coupling_of_a_held_body_is_refused(d: int, backend: str) -> None:
+    """R = +M: definite while M^2 is small beside stiffness and capacity, and indefinite far beyond."""
+
+    def coupled(size: float) -> Scene:
+        return scene(
+            d,
+            2,
+            time={"end": 0.1, "steps": 1, "coupling": "monolithic"},
+            elasticity=elasticity(d, 1.0, 0.3),
+            supports={"displacement": ["top"]},
+            heat={
+                "conductivity": 1e-3,
+                "capacity": 1.0,
+                "expansion": {"tensor": size},
+                "heating": {"tensor": size},
+            },
+        )
+
+    Run(coupled(0.1), backend=backend)
+    with pytest.raises(ValueError, match="indefinite"):
+        Run(coupled(10.0), backend=backend)
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 
