@@ -1,8 +1,7 @@
-"""What all tests share: the independent SciPy scheme, small scenes, and processes of their own."""
+"""Fixtures of all tests: the installed command, and the paper's problem on few cells."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,30 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.processes import Command, child_environment
 
 import warmslip
-
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # `from reference import scipy_scheme`
-
-Command = Callable[..., subprocess.CompletedProcess[str]]
-
-
-def child_environment() -> dict[str, str]:
-    """This process's environment without the marks its own MPI left in it, so that children start MPI afresh."""
-    marks = ("OMPI_COMM_", "OMPI_UNIVERSE", "OMPI_FILE_", "OMPI_NUM_", "OMPI_FIRST_", "PMIX_", "PRTE_LAUNCHED", "PMI_")
-    own = {k: v for k, v in os.environ.items() if not k.startswith(marks)}
-    settings = {
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_NUM_THREADS": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-        "OMPI_MCA_rmaps_base_oversubscribe": "1",
-        "OMPI_MCA_mpi_yield_when_idle": "1",
-        "OMPI_MCA_ess_singleton_isolated": "1",
-        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    }
-    return settings | own
 
 
 @pytest.fixture(name="command")

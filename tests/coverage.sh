@@ -14,8 +14,8 @@ ctest --preset coverage
 mkdir -p "$build/python/warmslip"
 ln -sfn "$PWD"/python/warmslip/* "$PWD/$build"/_core.*.so "$build/python/warmslip"
 export PYTHONPATH=$PWD/tests/shadow:$PWD/$build/python
-python -m pytest -q -p no:cacheprovider -m "not slow" tests/unit tests/verification "$@"
+python -m pytest -q -p no:cacheprovider -m "not slow" tests/core tests/python tests/repository "$@"
 
-gcovr --root . --filter cpp/include --filter cpp/src --exclude-throw-branches --exclude-unreachable-branches \
+gcovr --root . --filter cpp/warmslip --exclude-throw-branches --exclude-unreachable-branches \
   -j 2 --sort uncovered-number --print-summary \
   --txt "$build/coverage.txt" --html-details "$build/coverage.html" --fail-under-line 90 --fail-under-branch 80 "$build"

@@ -7,13 +7,13 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE / "verification")]
+sys.path[:0] = [str(HERE), str(HERE / "core")]
 
 import test_against_skfem as codes  # noqa: E402
 import test_exact_discrete as exact  # noqa: E402
 
-from warmslip.study import stamp  # noqa: E402
-from warmslip.verify import line  # noqa: E402
+from warmslip.studies.refinement_study import stamp  # noqa: E402
+from warmslip.verification import check  # noqa: E402
 
 TITLE = "The same scheme by others: exact rational arithmetic on a few cells, scikit-fem, SciPy"
 
@@ -22,7 +22,7 @@ def main(out: Path) -> None:
     found = [one for name, case in exact.CASES.items() for one in exact.march(name, case)[0]]
     for code, (reading, theta, coupling) in itertools.product(codes.CODES, codes.CASES):
         found += codes.lines(code, reading, theta, coupling)
-    line.write(out, found, stamp(None, title=TITLE))
+    check.write(out, found, stamp(None, title=TITLE))
     print(f"{sum(one.passed for one in found)} of {len(found)} lines")
 
 

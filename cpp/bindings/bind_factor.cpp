@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "warmslip/factor.hpp"
+#include "warmslip/la/factor.hpp"
 
 namespace warmslip::bindings {
 

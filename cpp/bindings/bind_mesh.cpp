@@ -1,6 +1,7 @@
 #include "bindings.hpp"
-#include "warmslip/nested.hpp"
-#include "warmslip/quadrature.hpp"
+#include "warmslip/mesh/box.hpp"
+#include "warmslip/mesh/prolongation.hpp"
+#include "warmslip/mesh/quadrature.hpp"
 
 namespace warmslip::bindings {
 namespace {

@@ -1,6 +1,6 @@
 #include "bindings.hpp"
-#include "warmslip/contact_surface.hpp"
-#include "warmslip/operators.hpp"
+#include "warmslip/fem/contact_surface.hpp"
+#include "warmslip/fem/operators.hpp"
 
 namespace warmslip::bindings {
 namespace {

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "warmslip/problem.hpp"
+#include "warmslip/physics/problem.hpp"
 
 namespace warmslip::bindings {
 namespace {

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "warmslip/stepper.hpp"
+#include "warmslip/time/stepper.hpp"
 
 namespace warmslip::bindings {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "warmslip/petsc.hpp"
+#include "warmslip/la/petsc.hpp"
 
 namespace warmslip::bindings {
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-PACKAGE, HEADERS = ROOT / "python" / "warmslip", ROOT / "cpp" / "include" / "warmslip"
+PACKAGE, HEADERS = ROOT / "python" / "warmslip", ROOT / "cpp" / "warmslip"
 MET = ("StepReport2", "Cost", "Stepper2", "Operators2", "Factor")  # objects of the core that a user meets
 
 
@@ -119,7 +119,7 @@ def commands() -> str:
     """Every command with its arguments and options, from the program itself."""
     import typer
 
-    from warmslip.cli import app
+    from warmslip.cli.main import app
 
     group: Any = typer.main.get_command(app)
     out = ["## Options of all commands", *_parameters(group)]
@@ -166,7 +166,7 @@ def core() -> str:
 
 def _comment(struct: str, field: str) -> str:
     """What the headers say of a field."""
-    for path in sorted(HEADERS.glob("*.hpp")):
+    for path in sorted(HEADERS.rglob("*.hpp")):
         if body := re.search(rf"^(?:struct|class) {struct} \{{(.*?)^\}};", path.read_text(), re.DOTALL | re.MULTILINE):
             found = re.search(rf"\b{field}\b[^;\n]*;\s*///< (.*)$", body[1], re.MULTILINE)
             return found[1] if found else ""
@@ -184,16 +184,15 @@ def _type(text: str) -> str:
 
 
 def headers() -> str:
-    """The layers of ARCHITECTURE.md, each header with its first comment and its text."""
-    rows = re.findall(r"^\| (L\d \w+) \| ([\w, ]+) \| (.*) \|$", (ROOT / "ARCHITECTURE.md").read_text(), re.MULTILINE)
+    """The modules of ARCHITECTURE.md, each header with its first comment and its text."""
+    rows = re.findall(r"^\| `cpp/warmslip/(\w+)` \| (.*) \|$", (ROOT / "ARCHITECTURE.md").read_text(), re.MULTILINE)
     out: list[str] = []
-    for layer, names, what in rows:
-        out += ["", f"## {layer}", "", f"{what[0].upper()}{what[1:]}."]
-        for name in names.split(", "):
-            path = HEADERS / f"{name}.hpp"
+    for module, what in rows:
+        out += ["", f"## {module}", "", f"{what[0].upper()}{what[1:]}."]
+        for path in sorted((HEADERS / module).glob("*.hpp")):
             text = path.read_text()
             first = re.match(r"(//.*\n)+", text)
             sentence = " ".join(re.findall(r"^// ?(.*)$", first[0], re.MULTILINE)) if first else ""
-            out += ["", f"### {name}", "", _cell(sentence), "", f"<details><summary>{name}.hpp</summary>", ""]
+            out += ["", f"### {path.stem}", "", _cell(sentence), "", f"<details><summary>{path.name}</summary>", ""]
             out += ["```cpp", text.rstrip(), "```", "", "</details>"]
     return "\n".join(out)

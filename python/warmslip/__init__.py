@@ -10,15 +10,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from warmslip.scene import Scene, SceneError, load
+from warmslip.scene.errors import SceneError
+from warmslip.scene.reader import load
+from warmslip.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from warmslip.laws import Law
-    from warmslip.loads import Loads
-    from warmslip.problem import Discretisation, discretise
-    from warmslip.runner import Result, Run, run
-    from warmslip.state import State
-    from warmslip.trajectory import Trajectory
+    from warmslip.io.trajectory import Trajectory
+    from warmslip.model.contact_laws import Law
+    from warmslip.model.discretisation import Discretisation, discretise
+    from warmslip.model.loads import Loads
+    from warmslip.model.state import State
+    from warmslip.simulation.run import Result, Run, run
 
 __all__ = [
     "Discretisation",
@@ -37,15 +39,15 @@ __all__ = [
 
 # the compiled core is loaded when it is first needed: scenes can be read and checked without it
 _LAZY = {
-    "Law": "laws",
-    "Loads": "loads",
-    "Discretisation": "problem",
-    "discretise": "problem",
-    "Result": "runner",
-    "Run": "runner",
-    "run": "runner",
-    "State": "state",
-    "Trajectory": "trajectory",
+    "Law": "model.contact_laws",
+    "Loads": "model.loads",
+    "Discretisation": "model.discretisation",
+    "discretise": "model.discretisation",
+    "Result": "simulation.run",
+    "Run": "simulation.run",
+    "run": "simulation.run",
+    "State": "model.state",
+    "Trajectory": "io.trajectory",
 }
 
 

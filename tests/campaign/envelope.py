@@ -21,7 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from campaign.run import write
 from campaign.workers import served
-from warmslip.scene import Scene, SceneError, build, load
+from warmslip.scene.errors import SceneError
+from warmslip.scene.reader import build, load
+from warmslip.scene.scene import Scene
 
 BISECTIONS = 3  # of a decade
 LIMIT = 300.0  # seconds an axis may take
@@ -200,7 +202,8 @@ def main(arguments: list[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     lines = table(given.scenes, given.axes, given.jobs)
     write(given.out / "envelope.csv", lines)
-    from warmslip import figures, provenance
+    from warmslip import figures
+    from warmslip.records import provenance
 
     stamp = provenance.stamp(scenes={name: SCENES[name]().resolved() for name in given.scenes})
     (given.out / "envelope.json").write_text(json.dumps(stamp, indent=2) + "\n")

@@ -28,7 +28,9 @@ from reference.extended_forms import VOIGT, isotropic
 from reference.extended_numbers import big, floats, mid, zeros
 from reference.extended_scheme import Scheme, State
 
-from warmslip.scene import Scene, SceneError, build
+from warmslip.scene.errors import SceneError
+from warmslip.scene.reader import build
+from warmslip.scene.scene import Scene
 
 TOLERANCE = 1e-6  # of a field, relative to its largest value in the run
 HELD = 1e-9  # doubles can hold an answer that one unit in the last place of the data moves by no more
@@ -54,7 +56,7 @@ class Ran:
 
 def run(scene: Scene, backend: str = "automatic") -> Ran:
     """Runs a scene, in memory. Refusals and failures become outcomes: `refused`, `crash`."""
-    from warmslip.runner import Run
+    from warmslip.simulation.run import Run
 
     began = time.perf_counter()
     try:

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from campaign import sample as sampling
 from campaign.workers import served
-from warmslip.scene import SceneError
+from warmslip.scene.errors import SceneError
 
 CLASSES = (
     *(
@@ -127,7 +127,8 @@ def main(arguments: list[str] | None = None) -> int:
     table = summary(lines)
     write(given.out / "campaign.csv", lines)
     write(given.out / "campaign_summary.csv", table)
-    from warmslip import figures, provenance
+    from warmslip import figures
+    from warmslip.records import provenance
 
     stamp = provenance.stamp(
         seed=sampling.SEED, scenes={f: sum(line["family"] == f for line in lines) for f in given.families}

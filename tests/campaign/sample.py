@@ -13,7 +13,8 @@ from typing import Any
 
 from scipy.stats import qmc
 
-from warmslip.scene import Scene, build
+from warmslip.scene.reader import build
+from warmslip.scene.scene import Scene
 
 SEED = 20240617
 FAMILIES = {"supported": 2048, "solid": 256, "free": 256, "laws": 512}

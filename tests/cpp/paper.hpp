@@ -1,6 +1,7 @@
 // The paper's problem in the plane and one dimension up, as the C++ tests take it.
 #pragma once
-#include "warmslip/stepper.hpp"
+#include "warmslip/mesh/box.hpp"
+#include "warmslip/time/stepper.hpp"
 
 namespace warmslip {
 

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "warmslip/contact_share.hpp"
+#include "warmslip/contact/minimal_forces.hpp"
+#include "warmslip/contact/residual.hpp"
+#include "warmslip/contact/solver.hpp"
 
 using namespace warmslip;
 

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "warmslip/element.hpp"
-#include "warmslip/quadrature.hpp"
+#include "warmslip/mesh/quadrature.hpp"
+#include "warmslip/physics/p1.hpp"
 
 using namespace warmslip;
 

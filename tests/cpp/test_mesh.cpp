@@ -1,8 +1,9 @@
 // Box meshes, meshes from lists and what they refuse, prolongation between nested meshes.
 #include <doctest/doctest.h>
 
-#include "warmslip/element.hpp"
-#include "warmslip/nested.hpp"
+#include "warmslip/mesh/box.hpp"
+#include "warmslip/mesh/prolongation.hpp"
+#include "warmslip/physics/p1.hpp"
 
 using namespace warmslip;
 

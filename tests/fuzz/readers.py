@@ -21,10 +21,12 @@ import h5py
 import numpy as np
 
 import warmslip
-from warmslip import SceneError, _core, checkpoint, mesh_files
-from warmslip.expressions import Expression
-from warmslip.runner import Run
-from warmslip.scene import build
+from warmslip import SceneError, _core
+from warmslip.mesh import files
+from warmslip.scene.expressions import Expression
+from warmslip.scene.reader import build
+from warmslip.simulation import checkpoint
+from warmslip.simulation.run import Run
 
 CORPUS = Path(__file__).parent / "corpus"
 FOLDER = Path(tempfile.mkdtemp(prefix="warmslip-fuzz-"))
@@ -34,7 +36,7 @@ CELLS = 100  # of what is stepped
 
 
 def _written(name: str, data: bytes) -> Path:
-    mesh_files._read.cache_clear()  # it tells files apart by their times, which are coarser than these runs are short
+    files._read.cache_clear()  # it tells files apart by their times, which are coarser than these runs are short
     path = FOLDER / name
     path.write_bytes(data)
     return path
@@ -48,7 +50,7 @@ def _refused(error: Exception) -> bool:
 def _stepped(scene: warmslip.Scene) -> None:
     """One step of a small scene. ValueError is a refusal; the rest that can go wrong in a step is an outcome."""
     table = scene.mesh
-    cells = len(mesh_files.read(table.file).cells) if table.file else 6 * np.prod(table.counts, dtype=float)
+    cells = len(files.read(table.file).cells) if table.file else 6 * np.prod(table.counts, dtype=float)
     if cells <= CELLS:
         with contextlib.suppress(ValueError):
             next(Run(scene).steps(), None)
@@ -77,7 +79,7 @@ def mesh(data: bytes) -> bool:
     """A gmsh file, and a body of that mesh that hangs on its first part and touches with the others."""
     path = str(_written("mesh.msh", data))
     try:
-        read = mesh_files.read(path)
+        read = files.read(path)
         kind = _core.Mesh2 if read.dim == 2 else _core.Mesh3
         kind.from_lists(read.nodes, read.cells, read.parts)
     except ValueError as error:

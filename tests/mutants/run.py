@@ -30,7 +30,14 @@ from rich.progress import Progress
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 # not those that compare files with files: they would notice the seeding itself
-SELECT = ["-m", "not slow", "--deselect", "tests/unit/test_public_files.py", "--deselect", "tests/unit/test_faults.py"]
+SELECT = [
+    "-m",
+    "not slow",
+    "--deselect",
+    "tests/repository/test_public_files.py",
+    "--deselect",
+    "tests/repository/test_faults.py",
+]
 STORED = "*norms on any number of ranks*"  # native tests that compare with stored numbers: they come last
 CONTROL = "control"  # the fault that is none: nothing may notice it
 PATIENCE = 1800  # seconds of a test run after which it is said to loop
@@ -129,7 +136,9 @@ class Tree:
     def _python(self, near: str, *, every: bool) -> list[str]:
         # of the mathematics first
         files = [
-            p for folder in ("verification", "unit") for p in sorted((self.at / "tests" / folder).glob("test_*.py"))
+            p
+            for folder in ("core", "python", "repository")
+            for p in sorted((self.at / "tests" / folder).rglob("test_*.py"))
         ]
         files.sort(key=lambda path: not (near and re.search(rf"\b{near}\b", path.read_text())))
         tests = self._run(

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from reference.extended_numbers import ONE, ZERO, Array, Big, big, entries, floats, matrix, mid, simplex_rule, zeros
-from warmslip.expressions import Expression
-from warmslip.scene import Scene
+from warmslip.scene.expressions import Expression
+from warmslip.scene.scene import Scene
 
 LOAD_POINTS = 3  # of a formula, an edge
 PARTS = {2: ("left", "right", "bottom", "top"), 3: ("left", "right", "front", "back", "bottom", "top")}

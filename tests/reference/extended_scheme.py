@@ -35,7 +35,7 @@ from reference.extended_numbers import (
     zeros,
 )
 from reference.extended_path import answer
-from warmslip.scene import Scene
+from warmslip.scene.scene import Scene
 
 SOLVED = 1e-30  # what an equation may leave over, relative to its largest term
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from support.folders import ROOT
 
-from warmslip import blocks
+from warmslip.studies import block_cost
 
-ROOT = Path(__file__).resolve().parents[2]
 CI = "workflows/config/ci.yaml"
 PAPER = "workflows/config/paper.yaml"
 READINGS = ("printed", "mixed", "isotropic", "consistent")
@@ -130,7 +130,7 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
 
 def test_committed_costs_are_of_every_combination() -> None:
     """And their counts are those of the blocks that are there."""
-    chosen = list(blocks.combinations())
+    chosen = list(block_cost.combinations())
     with (ROOT / "results/tradeoff/blocks.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [{key: row[key] for key in chosen[0]} for row in rows] == chosen

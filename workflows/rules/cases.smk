@@ -1,21 +1,25 @@
 # What is computed: a case is a study, named reading_theta_coupling or reading_theta_coupling_quadrature.
 
-from warmslip.provenance import PACKAGE, fingerprint
+from warmslip.records.provenance import PACKAGE, fingerprint
 
 READINGS = config["readings"]
 TEMPERATURES = config["foundation_temperatures"]
 FINGERPRINT = fingerprint()
 
 
-def digest(folder: Path) -> str:
-    """A hash of the Python files of a folder."""
+def digest(*folders: str) -> str:
+    """A hash of the Python files of some packages."""
     return hashlib.sha256(
-        b"".join(p.read_bytes() for p in sorted(folder.glob("*.py")))
+        b"".join(
+            path.read_bytes()
+            for name in folders
+            for path in sorted((PACKAGE / name).rglob("*.py"))
+        )
     ).hexdigest()[:16]
 
 
-MEASURING = digest(PACKAGE)
-FIGURES = digest(PACKAGE / "figures")
+MEASURING = digest("studies", "paper", "verification", "cli")
+FIGURES = digest("figures")
 
 # grid of every case: full, or diagonal (h = k)
 CASES = {

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import warmslip
-from warmslip import explain
+from warmslip.scene import plan
 
 Path("foot.toml").write_text("""\
 title = "A rubber foot dragged to and fro"
@@ -42,7 +42,7 @@ stiffness = 1e4
 coefficient = 0.3
 """)
 scene = warmslip.load("foot.toml")
-print(explain.text(explain.plan(scene)))
+print(plan.text(plan.plan(scene)))
 
 # %% [markdown]
 # Every table is a block of the problem. There is no `[inertia]`, so every step is in equilibrium; no `[heat]`, so there is no

@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import warmslip
-from warmslip import study
-from warmslip.rates import least_squares
+from warmslip.studies import refinement_study
+from warmslip.studies.rates import least_squares
 
 READINGS = ("printed", "mixed", "isotropic", "consistent")
 scenes = {name: warmslip.load(f"paper_{name}").override(**{"mesh.n": 16, "time.steps": 16}) for name in READINGS}
@@ -64,7 +64,7 @@ for name in ("mixed", "consistent"):
 figure, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 errors, orders = {}, {}
 for name in READINGS:
-    rows = study.study(scenes[name].override(**{FOUNDATION: 10.0}), levels=[8, 16, 32], reference=64)[:-1]
+    rows = refinement_study.study(scenes[name].override(**{FOUNDATION: 10.0}), levels=[8, 16, 32], reference=64)[:-1]
     h, errors[name] = [row["h"] for row in rows], [row["e_u_theta"] for row in rows]
     orders[name], _ = least_squares(h, errors[name])
     ax.loglog(h, errors[name], "o-", label=f"{name}, order {orders[name]:.2f}")

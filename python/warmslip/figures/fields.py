@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from warmslip.figures.style import GREY, INK, PALE, SKY, VERMILLION, number
-from warmslip.scene import FullScene, build_full
+from warmslip.scene.full import FullScene, build_full
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))

@@ -12,7 +12,8 @@ from matplotlib.patches import Rectangle
 
 from warmslip.figures.fields import final
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, PALE, VERMILLION
-from warmslip.scene import FullScene, load
+from warmslip.scene.full import FullScene, full_model
+from warmslip.scene.reader import load
 
 # a part of the square: its start, its direction
 SIDES = {"left": ((0, 0), (0, 1)), "right": ((1, 0), (0, 1)), "bottom": ((0, 0), (1, 0)), "top": ((0, 1), (1, 0))}
@@ -22,7 +23,7 @@ SCALE = 0.18  # length of an arrow a unit of load
 
 def setting(inputs: list[Path]) -> tuple[Figure, str]:
     """The body of the first input's scene; the foundation temperatures of all. Inputs are scenes or trajectories."""
-    scenes = [load(path).full() if path.suffix == ".toml" else final(path).scene for path in inputs]
+    scenes = [full_model(load(path)) if path.suffix == ".toml" else final(path).scene for path in inputs]
     scene = scenes[0]
     if scene.mesh.shape != "square":
         raise ValueError(f"the setting is drawn for a square; this scene has a {scene.mesh.shape}")

@@ -1,0 +1,82 @@
+#include "warmslip/contact/residual.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace warmslip {
+namespace {
+
+// How far the penetration r is from those that bear `pressure`; infinite where none does, or none is known to.
+double distance(const NormalCompliance& law, double pressure, double r) {
+  if (pressure == 0) return std::max(r, 0.0);
+  if (law.rigid()) return std::abs(r);
+  if (law.custom) {
+    const double slope = law.tangent(r);
+    return slope > 0 ? std::abs(pressure - law.pressure(r)) / slope : unlimited;
+  }
+  if (law.stiffness == 0) return unlimited;
+  if (law.at_limit(pressure)) return pressure > law.most ? unlimited : std::max(law.deepest_rise() - r, 0.0);
+  return std::abs(r - law.penetration(pressure, r));
+}
+
+}  // namespace
+
+template <int d>
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
+  double largest = 0, reach = 0, fastest = 0, widest = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto& point = problem.points[i];
+    if (point.prescribed) continue;
+    const auto at = static_cast<Eigen::Index>(i) * d;
+    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
+                   free = problem.free.template segment<d>(at);
+    const double speed = (w - w.dot(point.normal) * point.normal).norm(), lambda = f.dot(point.normal);
+    const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
+    // the velocity is what the contact force leaves of the free one
+    reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
+    fastest = std::max({fastest, free.norm(), w.norm()});
+    largest = std::max(largest, f.norm());
+    widest = std::max(widest,
+                      point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
+  }
+  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(fastest))
+    return std::numeric_limits<double>::infinity();
+  largest = std::max(largest, widest);
+  double worst = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const auto& point = problem.points[i];
+    const ContactLaw& law = problem.law(i);
+    const auto at = static_cast<Eigen::Index>(i) * d;
+    const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
+    const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
+    const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
+    const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
+    if (point.prescribed && law.compliance.rigid()) {  // it bears no pressure, and may be in by rounding alone
+      const double own = point.displacement.norm() + std::abs(point.gap) + problem.step * w.norm();
+      if (r > 0) worst = std::max(worst, r / std::max(reach, own));
+    }
+    if (point.prescribed) {  // its force is computed from its motion alone
+      const double size = std::max(f.norm(), bound),
+                   error = std::abs(lambda - (law.compliance.rigid() ? 0 : point.weight * law.compliance.pressure(r)));
+      if (!std::isfinite(error)) return unlimited;
+      if (size > 0) worst = std::max({worst, error / size, (f_tau.norm() - bound) / size});
+      continue;
+    }
+    const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
+                 away = distance(law.compliance, std::max(lambda, 0.0) / point.weight, r),
+                 pull = std::max(-lambda, 0.0);
+    const auto of_forces = [&](double force) { return largest > 0 ? force / largest : unlimited; };
+    const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
+    const double normal = off == 0 ? 0 : std::min(of_forces(off), apart);
+    const double friction =
+        friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
+    if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
+    worst = std::max({worst, normal, friction});
+  }
+  return worst;
+}
+
+template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
+template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
+
+}  // namespace warmslip

@@ -1,0 +1,127 @@
+// What is tried, in which order: Newton's method, then its safeguards.
+#include <algorithm>
+#include <stdexcept>
+
+#include "warmslip/contact/linearisation.hpp"
+
+namespace warmslip {
+namespace {
+
+constexpr int few_steps = 15;  // before other scales are tried
+
+// Whether all that friction does is to resist slip.
+template <int d>
+bool slips_alone(const ContactProblem<d>& problem, const ContactSolution<d>& solution) {
+  bool rubs = false;
+  for (std::size_t i = 0; i < solution.status.size(); ++i) {
+    if (solution.status[i] == Status::stick) return false;
+    const Point<d> force = solution.force.template segment<d>(static_cast<Eigen::Index>(i) * d),
+                   nu = problem.points[i].normal;
+    rubs = rubs || (force - force.dot(nu) * nu).norm() > 1e-14 * solution.force.norm();
+  }
+  return rubs;
+}
+
+}  // namespace
+
+template <int d>
+ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions options, RigidCoupling rigid)
+    : compliance_(std::move(compliance)), options_(options), rigid_(std::move(rigid)) {
+  if (compliance_.rows() != compliance_.cols() || compliance_.rows() % d != 0)
+    throw std::invalid_argument("the compliance must be square with d rows a contact point");
+  if (rigid_.motions.size() == 0) rigid_.motions.resize(compliance_.rows(), rigid_.count());
+  if (rigid_.loads.size() == 0) rigid_.loads = rigid_.motions;
+  spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
+  give_ = spectral_ > 0 ? spectral_ : 1;
+  carried_ = Eigen::MatrixXd::Zero(d, compliance_.rows());
+  if (rigid_.count() == 0 || rigid_.inertia.isZero(0)) return;
+  const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.loads.transpose());
+  for (Eigen::Index row = 0; row < compliance_.rows(); row += d)
+    carried_.middleCols<d>(row) = rigid_.motions.middleRows<d>(row) * velocities.middleCols<d>(row);
+}
+
+template <int d>
+ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force) {
+  ContactSolution<d> solution;
+  const Eigen::VectorXd guess = beyond_known(problem, force),
+                        none = beyond_known<d>(problem, Eigen::VectorXd::Zero(force.size()));
+  solution.force = force;
+  solution.added = guess;
+  solution.velocity = problem.free;
+  solution.rigid = Eigen::VectorXd::Zero(rigid_.count());
+  if (!problem.free.allFinite()) return solution;
+  const bool massive = rigid_.count() > 0 && !rigid_.inertia.isZero(0);
+  // the rigid motions under the forces that are there: their equations then hold in every iterate
+  const auto move = [&] {
+    solution.rigid.setZero();
+    if (massive)
+      solution.rigid =
+          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.loads.transpose() * solution.added);
+  };
+  const auto attempt = [&](Stage stage, auto&& method) {
+    if (solution.converged) return;
+    solution.stage = stage;
+    solution.converged = method();
+    if (!solution.converged) solution.added = guess;
+  };
+  // a body that lies on the foundation gives way by its deformation, one that hits it as a whole
+  const auto moving = [&](bool carries, int steps) {
+    const Trial trial(*this);
+    carries_ = carries;
+    options_.newton_steps = steps;
+    move();
+    return newton(problem, true, solution);
+  };
+  attempt(Stage::newton, [&] {
+    move();
+    return massive && force.isZero(0) ? moving(false, few_steps) : newton(problem, true, solution);
+  });
+  if (massive)
+    for (const auto& [carries, anew] : {std::pair{true, false}, std::pair{true, true}, std::pair{false, true}})
+      attempt(Stage::restart, [&, carries = carries, anew = anew] {
+        if (anew) solution.added = none;
+        return moving(carries, options_.newton_steps);
+      });
+  if (rigid_.count() > 0)  // it may have to come to the foundation first
+    for (const bool line_search : {true, false})
+      attempt(Stage::restart, [&] { return approach(problem, line_search, solution); });
+  if (rigid_.count() > 0 && !massive) attempt(Stage::restart, [&] { return draw(problem, solution); });
+  attempt(Stage::restart, [&] { return newton(problem, false, solution); });
+  // again from no force, with other scales of the tangential rows
+  for (const double boldness : {1.0, 0.1, 10.0, 0.01})
+    attempt(Stage::restart, [&] {
+      const Trial trial(*this);
+      boldness_ = boldness;
+      share_ = options_.proximal;
+      solution.added = none;
+      move();
+      return newton(problem, true, solution);
+    });
+  attempt(Stage::fixed_point, [&] {
+    const Trial trial(*this);
+    const bool unsupported = solution.unsupported;
+    move();
+    if (fixed_point(problem, solution) && held(problem, solution)) return true;
+    solution.unsupported = unsupported || solution.unsupported;
+    return false;
+  });
+  attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
+  if (massive && give_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(problem, solution)))
+    settle_down(problem, solution);
+  if (solution.converged && options_.proximal > 0) polish(problem, solution);
+  if (solution.converged && rigid_.count() > 0 && !massive) {
+    factor(problem, linearise(problem, solution.added, solution.rigid), solution);
+    solution.undetermined = solution.unsupported;
+  }
+  solution.unsupported = solution.unsupported && !solution.converged;
+  solution.rigid *= give_;
+  return solution;
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                             \
+  template ContactSolver<d>::ContactSolver(Eigen::MatrixXd, ContactOptions, RigidCoupling); \
+  template ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>&, const Eigen::VectorXd&);
+WARMSLIP_INSTANTIATE(2)
+WARMSLIP_INSTANTIATE(3)
+
+}  // namespace warmslip

@@ -1,0 +1,247 @@
+#include "warmslip/fem/contact_surface.hpp"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "warmslip/mesh/quadrature.hpp"
+
+namespace warmslip {
+namespace {
+
+template <int d>
+std::set<Index> nodes_of(const Mesh<d>& mesh, const std::vector<std::string>& parts) {
+  std::set<Index> nodes;
+  for (const auto& name : parts) {
+    const auto& facets = mesh.part(name);
+    nodes.insert(facets.nodes.data(), facets.nodes.data() + facets.nodes.size());
+  }
+  return nodes;
+}
+
+// Whether rows of a matrix that are not zero depend on each other. A pivot of their products, relative to its diagonal,
+// is the squared sine of the angle between a row and those eliminated before it. Eigen's SparseQR would do as well, but
+// it writes to memory that it did not get (SparseMatrix::uncompress).
+bool dependent(const Eigen::SparseMatrix<double, Eigen::RowMajor>& rows) {
+  constexpr double nothing = 1e-10;
+  const Eigen::VectorXd sizes = rows.cwiseProduct(rows) * Eigen::VectorXd::Ones(rows.cols());
+  std::vector<Eigen::Triplet<double>> chosen;
+  Eigen::Index some = 0;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    if (sizes[i] > 0) chosen.emplace_back(some++, i, 1 / std::sqrt(sizes[i]));
+  if (some > rows.cols() || some == 0) return some > 0;
+  Eigen::SparseMatrix<double> unit(some, rows.rows());
+  unit.setFromTriplets(chosen.begin(), chosen.end());
+  const Eigen::SparseMatrix<double> scaled = unit * Eigen::SparseMatrix<double>(rows);
+  const Eigen::SparseMatrix<double> products = scaled * Eigen::SparseMatrix<double>(scaled.transpose());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> pivots(products);
+  return pivots.info() != Eigen::Success || !(pivots.vectorD().minCoeff() > nothing);
+}
+
+}  // namespace
+
+template <int d>
+ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem) : layout_(layout) {
+  const Mesh<d>& mesh = layout.mesh();
+  const std::set<Index> clamped = nodes_of(mesh, problem.clamped);
+  std::vector<std::string> touching;
+  for (const ContactPart& contact : problem.contacts)
+    if (contact.law) touching.push_back(contact.part);
+  std::map<Index, Eigen::Index> number;
+  for (const Index node : nodes_of(mesh, touching)) {
+    number[node] = static_cast<Eigen::Index>(nodes_.size());
+    nodes_.push_back(node);
+  }
+  free_ = Eigen::VectorXd::Ones(nodes() * d);
+  for (Eigen::Index i = 0; i < nodes(); ++i)
+    if (clamped.contains(nodes_[static_cast<std::size_t>(i)])) free_.segment<d>(i * d).setZero();
+
+  std::vector<Point<d>> positions, normals;
+  std::vector<double> weights;
+  std::vector<Eigen::Triplet<double>> shape, scalar_shape;
+  const auto add_shape = [&](std::size_t point, Index node, double value) {
+    const int row = static_cast<int>(point), column = static_cast<int>(number.at(node));
+    scalar_shape.emplace_back(row, column, value);
+    for (int a = 0; a < d; ++a) shape.emplace_back(row * d + a, column * d + a, value);
+  };
+  for (std::size_t part = 0; part < problem.contacts.size(); ++part) {
+    const ContactPart& contact = problem.contacts[part];
+    if (!contact.law) continue;
+    const auto new_point = [&](const Point<d>& x, const Point<d>& nu, double weight) {
+      positions.push_back(x);
+      normals.push_back(nu);
+      weights.push_back(weight);
+      contacts_.push_back(part);
+      return weights.size() - 1;
+    };
+    const bool nodal = contact.quadrature.points == 0;
+    const Rule rule = simplex_rule(d - 1, nodal ? 1 : contact.quadrature.points);
+    std::map<Index, std::vector<std::size_t>> at_node;  // vertex rule: points that differ in normal only stay apart
+    const Facets<d>& facets = mesh.part(contact.part);
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+      const Point<d> area = area_normal(mesh, facets, f), nu = area.normalized();
+      if (nodal) {
+        for (int i = 0; i < d; ++i) {
+          const Index node = facets.nodes(f, i);
+          auto& here = at_node[node];
+          const auto same =
+              std::find_if(here.begin(), here.end(), [&](std::size_t p) { return (normals[p] - nu).norm() < 1e-12; });
+          if (same != here.end()) {
+            weights[*same] += area.norm() / d;
+          } else {
+            here.push_back(new_point(mesh.nodes.row(node).transpose(), nu, area.norm() / d));
+            add_shape(here.back(), node, 1);
+          }
+        }
+      } else {
+        for (Eigen::Index q = 0; q < rule.weights.size(); ++q) {
+          Point<d> x = Point<d>::Zero();
+          for (int i = 0; i < d; ++i) x += rule.barycentric(q, i) * mesh.nodes.row(facets.nodes(f, i)).transpose();
+          const std::size_t point = new_point(x, nu, area.norm() * rule.weights[q]);
+          for (int i = 0; i < d; ++i) add_shape(point, facets.nodes(f, i), rule.barycentric(q, i));
+        }
+      }
+    }
+  }
+  const auto count = static_cast<Eigen::Index>(weights.size());
+  weights_ = Eigen::Map<Eigen::VectorXd>(weights.data(), count);
+  positions_.resize(count, d);
+  normals_.resize(count, d);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    positions_.row(i) = positions[static_cast<std::size_t>(i)].transpose();
+    normals_.row(i) = normals[static_cast<std::size_t>(i)].transpose();
+  }
+  shape_.resize(count * d, nodes() * d);
+  shape_.setFromTriplets(shape.begin(), shape.end());
+  const Eigen::VectorXd moves = shape_ * free_;
+  for (Eigen::Index i = 0; i < count; ++i) prescribed_.push_back(moves.segment<d>(i * d).isZero(0));
+  scalar_shape_.resize(count, nodes());
+  scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
+
+  moving_shape_ = scalar_shape_;
+  moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return free_[node * d] != 0; });
+
+  shares_ = dependent(moving_shape_);
+
+  std::vector<int> touched(static_cast<std::size_t>(nodes()), 0);  // points that a node moves
+  for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];
+  own_nodes_.assign(static_cast<std::size_t>(count), -1);
+  for (const auto& entry : scalar_shape)
+    if (entry.value() == 1 && touched[static_cast<std::size_t>(entry.col())] == 1 && !prescribed(entry.row()))
+      own_nodes_[static_cast<std::size_t>(entry.row())] = entry.col();
+}
+
+template <int d>
+void ContactSurface<d>::add(const Eigen::VectorXd& nodal, Vec v) const {
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
+  const auto indices = unknowns(d);
+  Values own(v);
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    if (indices[i] >= begin && indices[i] < end) (*own)[indices[i] - begin] += nodal[static_cast<Eigen::Index>(i)];
+}
+
+template <int d>
+std::vector<PetscInt> ContactSurface<d>::unknowns(int block) const {
+  std::vector<PetscInt> indices;
+  for (const Index node : nodes_)
+    for (int a = 0; a < d; ++a) indices.push_back(layout_.global_of(node) * block + a);
+  return indices;
+}
+
+template <int d>
+std::vector<PetscInt> ContactSurface<d>::global_nodes() const {
+  std::vector<PetscInt> indices;
+  for (const Index node : nodes_) indices.push_back(layout_.global_of(node));
+  return indices;
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::nodal_values(Vec v) const {
+  if (nodes_.empty()) return {};
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
+  const auto indices = block_size(v) == 1 ? global_nodes() : unknowns(d);
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(indices.size()));
+  {
+    Values own(v);
+    for (std::size_t i = 0; i < indices.size(); ++i)
+      if (indices[i] >= begin && indices[i] < end) values[static_cast<Eigen::Index>(i)] = (*own)[indices[i] - begin];
+  }
+  return layout_.sum(std::move(values));
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::at_points(const Eigen::VectorXd& nodal) const {
+  return shape_ * nodal;
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::nodal_mean(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(nodes()), weight = sum,
+                  low = Eigen::VectorXd::Constant(nodes(), INFINITY), high = -low;
+  for (Eigen::Index q = 0; q < scalar_shape_.outerSize(); ++q)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(scalar_shape_, q); entry; ++entry) {
+      const Eigen::Index node = entry.col();
+      sum[node] += weights_[q] * entry.value() * values[q];
+      weight[node] += weights_[q] * entry.value();
+      low[node] = std::min(low[node], values[q]);
+      high[node] = std::max(high[node], values[q]);
+    }
+  return sum.cwiseQuotient(weight).cwiseMax(low).cwiseMin(high);
+}
+
+template <int d>
+Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const {
+  return (shape_.transpose() * forces).cwiseProduct(free_);
+}
+
+template <int d>
+Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) const {
+  const Eigen::MatrixXd free = free_.asDiagonal() * compliance * free_.asDiagonal();
+  const Eigen::MatrixXd half = shape_ * free;
+  return half * shape_.transpose();
+}
+
+template <int d>
+ContactProblem<d> contact_problem(const Problem<d>& problem, const ContactSurface<d>& surface, double k,
+                                  const Eigen::VectorXd& u, const Eigen::VectorXd& gap, Eigen::VectorXd free,
+                                  Eigen::VectorXd rigid) {
+  ContactProblem<d> out{{}, k, {}, std::move(free), std::move(rigid)};
+  for (const ContactPart& part : problem.contacts) out.laws.push_back(part.law.value_or(ContactLaw{}));
+  for (Eigen::Index i = 0; i < surface.points(); ++i) {
+    const Point<d> nu = surface.normals().row(i).transpose(), here = u.segment<d>(i * d);
+    out.points.push_back(
+        {nu, surface.weights()[i], here.dot(nu) - gap[i], here, gap[i], surface.contact(i), surface.prescribed(i)});
+  }
+  return out;
+}
+
+template <int d>
+ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& surface, const Eigen::VectorXd& force,
+                         const Eigen::VectorXd& w, const Eigen::VectorXd& free) {
+  const double rest = free.size() ? 1e-12 * free.cwiseAbs().maxCoeff() : 0;
+  ContactFlow flow{Eigen::VectorXd::Zero(surface.points()), Eigen::VectorXd::Zero(surface.points())};
+  for (Eigen::Index i = 0; i < surface.points(); ++i) {
+    const ContactPart& part = problem.contacts[surface.contact(i)];
+    const Point<d> nu = surface.normals().row(i).transpose(), velocity = w.segment<d>(i * d);
+    const Point<d> here = force.segment<d>(i * d), slip = velocity - velocity.dot(nu) * nu;
+    const double weight = surface.weights()[i], pressure = std::max(here.dot(nu), 0.0) / weight;
+    flow.conductance[i] = weight * part.heat.per_pressure * pressure;
+    flow.friction[i] = slip.norm() > rest ? part.heat.friction_share * here.dot(slip) : 0;
+  }
+  return flow;
+}
+
+#define WARMSLIP_INSTANTIATE(d)                                                                                  \
+  template class ContactSurface<d>;                                                                              \
+  template ContactProblem<d> contact_problem<d>(const Problem<d>&, const ContactSurface<d>&, double,             \
+                                                const Eigen::VectorXd&, const Eigen::VectorXd&, Eigen::VectorXd, \
+                                                Eigen::VectorXd);                                                \
+  template ContactFlow contact_flow<d>(const Problem<d>&, const ContactSurface<d>&, const Eigen::VectorXd&,      \
+                                       const Eigen::VectorXd&, const Eigen::VectorXd&);
+WARMSLIP_INSTANTIATE(2)
+WARMSLIP_INSTANTIATE(3)
+
+}  // namespace warmslip

@@ -1,0 +1,99 @@
+#include "warmslip/time/balances.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace warmslip {
+
+template <int d>
+Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                          const ContactSurface<d>& surface)
+    : layout_(layout),
+      problem_(problem),
+      operators_(operators),
+      surface_(surface),
+      elastic_rows_(row_sizes(operators.elasticity)),
+      viscous_rows_(row_sizes(operators.viscosity)),
+      expansion_rows_(row_sizes(operators.expansion)),
+      mass_rows_(row_sizes(operators.mass)),
+      conduction_rows_(row_sizes(operators.conductivity)),
+      exchange_rows_(row_sizes(operators.exchange)),
+      heating_rows_(row_sizes(operators.heating)),
+      unknowns_(surface.unknowns(d)),
+      nodes_(surface.global_nodes()) {
+  if (operators.inertia) {  // its entries are positive
+    const VecHandle ones = layout.vector(d), sums = layout.vector(d);
+    WARMSLIP_PETSC(VecSet(ones, 1));
+    multiply(operators.inertia, ones, sums);
+    inertia_rows_ = (*Values(sums)).reshaped(d, layout.owned()).colwise().maxCoeff().transpose();
+  }
+  if (operators.viscosity) viscous_w_ = layout.vector(d);
+  if (surface.points() > 0) contact_force_ = layout.vector(d);
+  if (operators.conductivity) conducted_ = layout.vector(1);
+  if (operators.exchange) exchanged_ = layout.vector(1);
+  if (operators.conductivity && problem.contact_heats()) {
+    contact_heat_ = layout.vector(1);
+    contact_heat_size_ = layout.vector(1);
+  }
+  centroid_ = layout.mesh().nodes.colwise().mean().transpose();
+  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
+  for (PetscInt& i : unknowns_) i -= first * d;
+  for (PetscInt& i : nodes_) i -= first;
+  clamped_.resize(static_cast<std::size_t>(layout.owned()));
+  cooled_.resize(clamped_.size());
+  for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
+  for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+  for (const auto& [rows, size] :
+       {std::pair{&heating_rows_, &heating_}, std::pair{&mass_rows_, &mass_},
+        std::pair{&conduction_rows_, &conduction_}, std::pair{&exchange_rows_, &exchange_}}) {
+    size->sum = layout.sum(rows->size() ? rows->sum() : 0.0);
+    size->most = over_ranks(layout.comm(), std::array{rows->size() ? rows->maxCoeff() : 0.0})[0];
+  }
+  any_cooled_ = layout.sum(static_cast<double>(operators.cooled.size())) > 0;
+  double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
+  MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
+  const double length = (layout.mesh().nodes.colwise().maxCoeff() - layout.mesh().nodes.colwise().minCoeff()).norm();
+  for (const Material<d>& material : problem.materials) {
+    reference_ = std::max(reference_, std::abs(material.reference));
+    if (!material.elasticity || !material.expansion) continue;
+    const Mandel<d> strain = material.elasticity->colPivHouseholderQr().solve(to_mandel<d>(*material.expansion));
+    free_expansion_ = std::max(free_expansion_, length * strain.norm());
+  }
+  heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
+  force_magnitudes_ = force_external_ = Eigen::VectorXd::Zero(layout.owned() * d);
+  interpolate_anew();
+}
+
+template <int d>
+Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
+  if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
+  multiply(operators_.conductivity, after.theta, conducted_);
+  multiply(operators_.exchange, after.theta, exchanged_);
+  return terms(before, after, in);
+}
+
+template <int d>
+void Bookkeeper<d>::weigh(const Level& before, const Level& after, const StepInputs& in) {
+  keeps_ = true;
+  terms(before, after, in);
+  keeps_ = false;
+}
+
+template <int d>
+Ledger Bookkeeper<d>::terms(const Level& before, const Level& after, const StepInputs& in) {
+  Ledger ledger{};
+  work_magnitude_ = 0;
+  if (surface_.points() > 0) contact(before, after, in, ledger);
+  if (after.w) {
+    forces(before, after, in, ledger);
+    energy(before, after, in, ledger);
+  }
+  if (after.theta) heat(before, after, in, ledger);
+  return ledger;
+}
+
+template class Bookkeeper<2>;
+template class Bookkeeper<3>;
+
+}  // namespace warmslip

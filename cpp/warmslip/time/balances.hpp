@@ -1,0 +1,74 @@
+// The balances every step must close to round-off: energy, heat, force and moment, and the contact law itself.
+// They are computed from the step's result with the un-eliminated operators, not from the solver's own residuals.
+#pragma once
+#include "warmslip/time/roundoff.hpp"
+#include "warmslip/time/time_level.hpp"
+
+namespace warmslip {
+
+template <int d>
+class Bookkeeper {
+ public:
+  Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+             const ContactSurface<d>& surface);
+
+  /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
+  void rigid_share(double share) { rigid_share_ = share; }
+
+  /// Closes the books of the step from `before` to `after` (collective).
+  Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+  /// Keeps the magnitudes of the equations of the step that was closed last, for `add_rounding` (collective).
+  void weigh(const Level& before, const Level& after, const StepInputs& inputs);
+
+  /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`,
+  /// where given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
+  void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+                       Vec external = nullptr) const;
+  void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+                   Vec external = nullptr) const;
+  /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
+  /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
+  /// any, gets the same but for the inner terms, whose rounding moves no rigid body.
+  void add_rounding(Vec defect, Vec external) const;
+
+ private:
+  Ledger terms(const Level& before, const Level& after, const StepInputs& inputs);
+  void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void contact_heat(const Level& after, const StepInputs& inputs, const Eigen::VectorXd& w, Ledger& ledger);
+  void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  void heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
+  double temperature_of_rounding(const Level& before, const Level& after, double k) const;
+  void interpolate_anew();
+  Eigen::VectorXd at_points(Vec v) const;
+  void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
+
+  const Layout<d>& layout_;
+  const Problem<d>& problem_;
+  const Operators<d>& operators_;
+  const ContactSurface<d>& surface_;
+  VecHandle viscous_w_, contact_force_;         // B w, E lambda
+  VecHandle conducted_, exchanged_;             // D theta, J theta
+  VecHandle contact_heat_, contact_heat_size_;  // heat that leaves at the contact points, and its magnitudes
+  Eigen::SparseMatrix<double, Eigen::RowMajor>
+      shape_;  // hat functions at the contact points, found anew from positions
+  struct RowSizes {
+    double sum = 0, most = 0;
+  };
+  RowSizes heating_, mass_, conduction_, exchange_;     // of the rows of the heat equation
+  bool any_cooled_ = false;                             // whether a temperature is given
+  Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
+  Eigen::VectorXd force_external_, heat_external_;      // but for the inner forces and the conduction
+  double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
+  Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
+  Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
+  std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
+  std::vector<bool> clamped_, cooled_;      // a node
+  double rigid_share_ = 1;
+  bool keeps_ = false;                         // whether the step that is being closed notes its magnitudes
+  double stiffest_ = 0;                        // largest row of the elasticity
+  double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature
+  Point<d> centroid_;                          // moments are taken about it
+};
+
+}  // namespace warmslip

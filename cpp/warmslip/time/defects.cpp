@@ -1,0 +1,72 @@
+// What a step leaves of its equations, as load vectors for its refinement and for the estimate of its digits.
+#include <cstdint>
+#include <limits>
+
+#include "warmslip/time/balances.hpp"
+
+namespace warmslip {
+namespace {
+
+// out += factor * v, if there is such a vector
+void add(Vec out, double factor, Vec v) {
+  if (v) WARMSLIP_PETSC(VecAXPY(out, factor, v));
+}
+
+}  // namespace
+
+template <int d>
+void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
+                                    Vec external) const {
+  WARMSLIP_PETSC(VecCopy(in.force, out));
+  add(out, -1, contact_force_);
+  if (after.momentum) {
+    Values values(out), m1(after.momentum), m0(before.momentum);
+    *values -= (*m1 - *m0) / in.k;
+  }
+  if (external) WARMSLIP_PETSC(VecCopy(out, external));
+  add(out, 1, in.expansion_theta);
+  add(out, -1, viscous_w_);
+  add(out, -1, after.elastic_u);
+  Values values(out);
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    if (clamped_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
+}
+
+template <int d>
+void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
+                                Vec external) const {
+  WARMSLIP_PETSC(VecCopy(in.heat, out));
+  add(out, 1, in.heating_w);
+  add(out, -1, exchanged_);
+  add(out, -1, contact_heat_);
+  {
+    Values values(out), m1(after.mass_theta), m0(before.mass_theta);
+    *values -= (*m1 - *m0) / in.k;
+  }
+  if (external) WARMSLIP_PETSC(VecCopy(out, external));
+  add(out, -1, conducted_);
+  Values values(out);
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
+}
+
+template <int d>
+void Bookkeeper<d>::add_rounding(Vec defect, Vec external) const {
+  const Eigen::Index block = block_size(defect);
+  const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
+                        &outer = block == 1 ? heat_external_ : force_external_;
+  Values values(defect), outer_values(external);
+  for (PetscInt i = 0; i < layout_.owned(); ++i)
+    for (Eigen::Index a = 0; a < block; ++a) {
+      const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
+      const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
+      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
+      if (external)
+        (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];
+    }
+}
+
+template class Bookkeeper<2>;
+template class Bookkeeper<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,295 @@
+// The solves of a step: right-hand sides, contact forces, heat, and the way in and out of the coupled system.
+#include "warmslip/contact/minimal_forces.hpp"
+#include "warmslip/time/stepper.hpp"
+#include "warmslip/time/timer.hpp"
+
+namespace warmslip {
+namespace {
+
+// out -= factor a x, through `scratch`; nothing when there is no such operator.
+void subtract(Mat a, double factor, Vec x, Vec scratch, Vec out) {
+  if (!a) return;
+  WARMSLIP_PETSC(MatMult(a, x, scratch));
+  WARMSLIP_PETSC(VecAXPY(out, -factor, scratch));
+}
+
+// The largest entry of this rank.
+double largest_here(Vec v) {
+  if (!v) return 0;
+  Values values(v);
+  const auto entries = *values;
+  return entries.size() ? entries.lpNorm<Eigen::Infinity>() : 0;
+}
+
+}  // namespace
+
+template <int d>
+void Stepper<d>::products(Level& level) const {
+  multiply(operators_.inertia, level.w, level.momentum);
+  if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
+  multiply(operators_.mass, level.theta, level.mass_theta);
+  if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
+  std::array<double, 4> most{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
+                             largest_here(level.theta)};
+  MPI_Allreduce(MPI_IN_PLACE, most.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
+  level.sizes = {most[0], most[1], level.strained_w ? most[2] : most[1], most[3]};
+  if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
+}
+
+// The fixed entries of a right-hand side: scale times the given ones, or zero.
+template <int d>
+void Stepper<d>::fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale) {
+  PetscInt begin, end;
+  WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
+  Values values(v), known(given);
+  for (const PetscInt i : indices) (*values)[i - begin] = given ? scale * (*known)[i - begin] : 0;
+}
+
+// f + rho M w_{n-1} / k - A u_{n-1} + G theta_{n-1}, less what moving supports pull
+template <int d>
+void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::VectorXd& from) {
+  const double k = options_.k;
+  const Vec out = momentum_right_;
+  WARMSLIP_PETSC(VecCopy(loads.force, out));
+  if (now_.momentum && rigid_.empty()) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
+  if (now_.momentum && !rigid_.empty()) {
+    const Vec seen = next_.strained_w;
+    WARMSLIP_PETSC(VecCopy(now_.strained_w, seen));
+    rigid_.carry(now_.rigid - from, seen);
+    multiply(operators_.inertia, seen, correction_w_);
+    WARMSLIP_PETSC(VecAXPY(out, 1 / k, correction_w_));
+  }
+  if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
+  if (now_.elastic_u) WARMSLIP_PETSC(VecAXPY(out, -1, now_.elastic_u));
+  if (!monolithic() && now_.expansion_theta) WARMSLIP_PETSC(VecAXPY(out, 1, now_.expansion_theta));
+  const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_w_, out); };
+  if (loads.support_velocity) {
+    less(operators_.inertia, 1 / k, loads.support_velocity);
+    less(operators_.viscosity, 1, loads.support_velocity);
+    less(operators_.elasticity, k, loads.support_velocity);
+  }
+  if (monolithic() && loads.support_temperature) less(operators_.expansion, -1, loads.support_temperature);
+  fix(out, operators_.clamped, loads.support_velocity);
+}
+
+// q + M theta_{n-1} / k + E w, less what warm supports conduct; `scale` is that of the heat rows
+template <int d>
+void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double scale) {
+  const Vec out = heat_right_;
+  WARMSLIP_PETSC(VecCopy(loads.heat, out));
+  WARMSLIP_PETSC(VecAXPY(out, 1 / options_.k, now_.mass_theta));
+  if (heating_w) WARMSLIP_PETSC(VecAXPY(out, 1, heating_w));
+  const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_theta_, out); };
+  if (loads.support_temperature) {
+    less(operators_.mass, 1 / options_.k, loads.support_temperature);
+    less(operators_.conductivity, 1, loads.support_temperature);
+    less(operators_.exchange, 1, loads.support_temperature);
+  }
+  if (monolithic() && loads.support_velocity) less(operators_.heating, -1, loads.support_velocity);
+  fix(out, operators_.cooled, loads.support_temperature, 1 / scale);
+}
+
+// The free velocities of the contact points for a right-hand side, which is remembered with the load on the motions
+// that are solved for apart; `external` is the part of it that acts on those.
+template <int d>
+Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
+  const Eigen::VectorXd nodal = momentum_->reduce(right);
+  if (!rigid_.empty()) rigid_load_ = rigid_.load(external, right);
+  return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
+}
+
+// Gives the contact nodes that are also points the velocity of their law, in w; `moved` has the same change. Rounding
+// of the free velocity would else be that of a penetration far smaller.
+template <int d>
+void Stepper<d>::settle(const ContactSolution<d>& contact, Vec w, Vec moved) const {
+  std::vector<Eigen::Index> closed;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i)
+    if (surface_.own_node(i) >= 0 && contact.status[static_cast<std::size_t>(i)] != Status::open) closed.push_back(i);
+  if (closed.empty()) return;
+  const Eigen::VectorXd nodal = surface_.nodal_values(w);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(nodal.size());
+  for (const Eigen::Index i : closed) {
+    const Eigen::Index node = surface_.own_node(i);
+    const auto point = static_cast<std::size_t>(i);
+    const Point<d> velocity = nodal.segment<d>(node * d);
+    change.segment<d>(node * d) =
+        settled<d>(posed_.law(point), posed_.points[point], options_.k, contact.status[point],
+                   contact.force.template segment<d>(i * d), posed_.free.template segment<d>(i * d), velocity) -
+        velocity;
+  }
+  if (change.isZero(0)) return;
+  surface_.add(change, w);
+  if (moved) surface_.add(change, moved);
+}
+
+// The velocity and, monolithic, the temperature for the right-hand side of the last `reduce` and the forces of the
+// contact. Where rigid motions are solved for apart, `w` lacks them; they are returned.
+template <int d>
+Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec theta) {
+  const Vec out = monolithic() ? Vec(coupled_) : w;
+  momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), out);
+  Eigen::VectorXd motions;
+  if (!rigid_.empty()) {
+    motions = contact_ ? contact.rigid : rigid_.alone(rigid_load_);
+    rigid_.strain(motions, out);
+  }
+  if (monolithic()) split(coupled_, w, theta);
+  return motions;
+}
+
+template <int d>
+bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution) {
+  const Timed timed(cost_.contact_seconds);
+  solution = contact_->solve(posed_, guess);
+  if (solution.converged && surface_.shares())
+    share_least(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
+  // every rank solved the same small problem; let them agree to the last bit
+  MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
+  MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
+  MPI_Bcast(solution.rigid.data(), static_cast<int>(solution.rigid.size()), MPI_DOUBLE, 0, layout_.comm());
+  int found[] = {solution.converged, solution.unsupported, solution.undetermined};
+  MPI_Bcast(found, 3, MPI_INT, 0, layout_.comm());
+  solution.converged = found[0] != 0;
+  solution.unsupported = found[1] != 0;
+  solution.undetermined = found[2] != 0;
+  solution.status.resize(posed_.points.size(), Status::open);
+  MPI_Bcast(solution.status.data(), static_cast<int>(solution.status.size()), MPI_SIGNED_CHAR, 0, layout_.comm());
+  cost_.newton_iterations += solution.iterations;
+  cost_.dense_factorizations += solution.factorizations;
+  return solution.converged;
+}
+
+// Velocity (and, monolithic, temperature) of the step. Returns whether contact was solved for. A body without supports
+// is seen from its rigid motion so far, whose digits are then none of its own. Where contact stops it in a long step
+// the two motions cancel, and it is seen from rest.
+template <int d>
+bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contact) {
+  Eigen::VectorXd from = now_.rigid;
+  if (!reach_motion(loads, from, contact)) {
+    if (from.isZero(0) || !in_range(free_)) return false;
+    from.setZero();
+    if (!reach_motion(loads, from, contact)) return false;
+  }
+  const Timed part(cost_.momentum_seconds);
+  if (rigid_.empty()) {
+    expand(contact, next_.w, next_.theta);
+  } else {
+    next_.rigid = from + expand(contact, next_.strained_w, next_.theta);
+    WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
+    rigid_.carry(next_.rigid, next_.w);
+  }
+  if (contact_) settle(contact, next_.w, next_.strained_w);
+  return true;
+}
+
+// The contact of the step, seen from the rigid motion `from`.
+template <int d>
+bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact) {
+  {
+    const Timed part(cost_.momentum_seconds);
+    momentum_right_side(loads, from);
+    if (monolithic()) {
+      heat_right_side(loads, nullptr, coupled_scale_);
+      join(momentum_right_, heat_right_, coupled_right_);
+    }
+    free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
+    if (contact_ && !rigid_.empty()) free_ += carried_ * from;
+  }
+  if (!contact_) return true;
+  if (!in_range(free_)) return false;
+  posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
+  return solve_contact(contact_force_, contact);
+}
+
+// Heat that the contact leads or makes is known at the contact points alone: as power that a node loses by what it is
+// warmer than the foundation beside it, less what it receives at that temperature, from friction say. Counted from zero
+// the two would cancel where the contact leads heat well.
+template <int d>
+typename Stepper<d>::NodalFlow Stepper<d>::flow(const StepLoads& loads, const Eigen::VectorXd& force,
+                                                const Eigen::VectorXd& velocity) const {
+  const auto& shape = surface_.scalar_shape();
+  const ContactFlow at = contact_flow(problem_, surface_, force, velocity, free_);
+  NodalFlow out{shape.transpose() * at.conductance.asDiagonal() * shape, {}};
+  out.given =
+      shape.transpose() * (at.conductance.cwiseProduct(loads.foundation - shape * beside_) + at.friction).eval();
+  for (Eigen::Index i = 0; i < out.given.size(); ++i)
+    if (fixed_contact_[static_cast<std::size_t>(i)]) {  // a held temperature takes any flow
+      out.lost.row(i).setZero();
+      out.given[i] = 0;
+    }
+  return out;
+}
+
+template <int d>
+void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
+  const Timed timed(cost_.heat_seconds);
+  heat_right_side(loads, heating_w, 1);
+  if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
+  if (reactive()) {
+    beside_ = surface_.nodal_mean(loads.foundation);
+    flow_ = flow(loads, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)));
+  }
+  solve_heat(heat_right_, heat_external_, flow_.given, beside_, next_.theta);
+}
+
+// The temperatures theta_c = beside + t of the contact nodes, free - C (flow t - given) + W_c a with the constants a
+// that are solved for apart, are found from a dense linear system, as the contact forces are.
+template <int d>
+void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside,
+                            Vec out) {
+  const Eigen::VectorXd free = heat_->reduce(right);
+  const Eigen::Index m = constants_.count();
+  const Eigen::VectorXd load = m > 0 ? constants_.load(external, right) : Eigen::VectorXd();
+  if (!reactive()) {
+    heat_->expand(Eigen::VectorXd::Zero(free.size()), out);
+    if (m > 0) {
+      const Eigen::VectorXd constants = constants_.alone(load);
+      constants_.strain(constants, out);
+      constants_.carry(constants, out);
+    }
+    return;
+  }
+  const Eigen::Index n = free.size();
+  const Eigen::MatrixXd& compliance = heat_->compliance();
+  Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n + m, n + m);
+  Eigen::VectorXd loads(n + m);
+  system.topLeftCorner(n, n) += compliance * flow_.lost;
+  loads.head(n) = free - beside + compliance * given;
+  if (m > 0) {
+    Eigen::MatrixXd along(n, m);
+    for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(constants_.along(j));
+    system.topRightCorner(n, m) = -along;
+    system.bottomLeftCorner(m, n) = along.transpose() * flow_.lost;
+    system.bottomRightCorner(m, m) = constants_.inertia();
+    loads.tail(m) = load + along.transpose() * given;
+  }
+  const Eigen::VectorXd found = system.partialPivLu().solve(loads);
+  heat_->expand(flow_.lost * found.head(n) - given, out);
+  if (m > 0) {
+    constants_.strain(found.tail(m), out);
+    constants_.carry(found.tail(m), out);
+  }
+}
+
+template <int d>
+void Stepper<d>::join(Vec momentum, Vec heat, Vec coupled) const {
+  Values m(momentum), h(heat), c(coupled);
+  for (PetscInt i = 0; i < layout_.owned(); ++i) {
+    (*c).template segment<d>(i * (d + 1)) = (*m).template segment<d>(i * d);
+    (*c)[i * (d + 1) + d] = coupled_scale_ * (*h)[i];
+  }
+}
+
+template <int d>
+void Stepper<d>::split(Vec coupled, Vec w, Vec theta) const {
+  Values c(coupled), m(w), t(theta);
+  for (PetscInt i = 0; i < layout_.owned(); ++i) {
+    (*m).template segment<d>(i * d) = (*c).template segment<d>(i * (d + 1));
+    (*t)[i] = (*c)[i * (d + 1) + d];
+  }
+}
+
+template class Stepper<2>;
+template class Stepper<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,118 @@
+// The equation of motion at every node, and the balances of force and moment of the whole body.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "warmslip/time/balances.hpp"
+
+namespace warmslip {
+namespace {
+
+// Sums of nodal forces and of their moments, and of their sizes.
+template <int d>
+struct Resultant {
+  static constexpr int moments = d == 2 ? 1 : 3, many = d + moments;
+  Eigen::Vector<double, many> sum = Eigen::Vector<double, many>::Zero(), size = sum;
+  // a force at a place, and the magnitudes of its own terms
+  void add(const Point<d>& x, const Point<d>& f, double magnitude) {
+    sum.template head<d>() += f;
+    if constexpr (d == 2)
+      sum[2] += x[0] * f[1] - x[1] * f[0];
+    else
+      sum.template tail<3>() += x.cross(f);
+    size.template head<d>().array() += magnitude;
+    size.template tail<moments>().array() += x.norm() * magnitude;
+  }
+};
+
+}  // namespace
+
+// The equation of motion at every free node, force and moment: the supports' reactions are the residuals of the fixed
+// rows.
+template <int d>
+void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+  Resultant<d> force;
+  double work = 0;
+  enum { defect, backward, acting, applied, strained, inner };
+  std::array<double, 6> most{};
+  const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
+  const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
+               w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta;
+  const bool warm = theta > temperature_of_rounding(before, after, in.k);
+  {
+    Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
+        b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
+        s0(before.shape());
+    for (PetscInt i = 0; i < layout_.owned(); ++i) {
+      const Point<d> position =
+          layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
+      const auto at = [&](auto&& v) -> Point<d> {
+        return v.size() ? Point<d>(v.template segment<d>(i * d)) : Point<d>(Point<d>::Zero());
+      };
+      const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
+                     elastic = at(*e1), viscous = at(*b), expansion = at(*g), way = at(*velocity);
+      const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
+      const auto row = [i](const Eigen::VectorXd& rows) { return rows.size() ? rows[i] : 0; };
+      const auto size = [](const Point<d>& p) { return p.cwiseAbs().maxCoeff(); };
+      const double given = size(load) + size(contact_here), expands = size(expansion),
+                   stretches = std::max(size(elastic), size(viscous)),
+                   moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
+                   within = u * row(elastic_rows_) + w * row(viscous_rows_),
+                   magnitude = moved + given + within + theta * row(expansion_rows_);
+      const bool fixed = clamped_[static_cast<std::size_t>(i)];
+      // a force in one direction has no rounding in another, in which the body may be free to move
+      const Point<d> outer =
+          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
+      if (keeps_) force_external_.template segment<d>(i * d) = outer;
+      if (keeps_)
+        force_magnitudes_.template segment<d>(i * d) =
+            fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
+      if (fixed) {
+        force.add(position, external - left, magnitude);
+        l.support_work += in.k * left.dot(way);
+      } else {
+        // inner forces cancel in the sum over a body
+        force.add(position, external, moved + given + rigid_share_ * (magnitude - moved - given));
+        const double rest = left.allFinite() ? size(left) : std::numeric_limits<double>::infinity();
+        raise(defect, rest);
+        // a point at rest has a strain rate of rounding of the rigid motion, which it stops
+        const double least = after.strained && surface_.points() > 0
+                                 ? 1e-5 * w_both * (in.k * row(elastic_rows_) + row(viscous_rows_))
+                                 : 0;
+        if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / (magnitude + least));
+      }
+      work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
+      if (fixed) continue;
+      raise(applied, given + (warm ? expands : 0));
+      raise(strained, stretches);
+      raise(inner, within);
+      raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
+    }
+  }
+  constexpr Eigen::Index many = Resultant<d>::many;
+  Eigen::VectorXd all(2 * many + 2);
+  all << force.sum, force.size, work, l.support_work;
+  all = layout_.sum(std::move(all));
+  const auto sums = all.template head<many>(), sizes = all.template segment<many>(many);
+  work_magnitude_ += all[2 * many];
+  l.support_work = all[2 * many + 1];
+  most = over_ranks(layout_.comm(), most);
+  l.force_residual = most[backward];
+  for (Eigen::Index i = 0; i < sums.size(); ++i)
+    l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
+  l.force_defect = relative(most[defect], most[acting]);
+  // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u makes are none
+  const bool loaded = most[applied] > 1e-14 * most[inner];
+  l.force_scale = loaded ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
+  l.contact_scale = loaded ? 1e-9 * l.force_scale : l.force_scale;
+  // and displacements whose forces could at most be so small are none
+  if (stiffest_ > 0) l.displacement_scale = 1e-8 * l.force_scale / stiffest_;
+  // as are those that rounding of a temperature makes
+  l.displacement_scale = std::max(l.displacement_scale, 1e-8 * free_expansion_ * std::max(theta, reference_));
+}
+
+template class Bookkeeper<2>;
+template class Bookkeeper<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,288 @@
+// Iterative refinement of a step, contact included, and how many digits of it can be trusted.
+#include <algorithm>
+#include <cmath>
+
+#include "warmslip/time/stepper.hpp"
+
+namespace warmslip {
+namespace {
+
+double largest_entry(Vec v) {
+  PetscReal value = 0;
+  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+  return value;
+}
+
+double largest_entry(const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
+
+}  // namespace
+
+double Errors::largest() const {
+  double worst = 0;
+  for (const double error : {u, theta, stress, contact_force})
+    if (std::isgreater(error, worst)) worst = error;  // quiet about nan, also where it traps
+  return worst;
+}
+
+// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `floor`.
+template <int d>
+void Stepper<d>::note(double& error, Extent& field, double change, double size, double floor) {
+  field.tried = change;
+  field.size = std::max(field.size, size);
+  field.scale = std::max({field.scale, size, floor});
+  error = field.scale > 0 ? change / field.scale : 0;
+}
+
+// One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
+// solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
+template <int d>
+bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply) {
+  const bool monolithic = this->monolithic();
+  const StepInputs inputs = this->inputs(loads, contact);
+  books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
+  if (!apply) books_.add_rounding(momentum_right_, momentum_external_);
+  if (monolithic) {
+    books_.heat_defect(now_, next_, inputs, heat_right_);
+    if (!apply) books_.add_rounding(heat_right_, nullptr);
+    join(momentum_right_, heat_right_, coupled_right_);
+  }
+  const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
+  ContactSolution<d> change, again;
+  correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
+  if (contact_) {
+    const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
+    posed_.known_force = contact.force;
+    posed_.known_velocity = apply ? velocity + correction : velocity;
+    posed_.rigid = rigid_load_;
+    posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
+    again = contact;
+    if (!(apply ? solve_contact(contact.force, again) : respond(correction + creep(contact), again))) return false;
+    if (apply) free_ = posed_.free;
+    change = again;
+    change.force = again.added;
+    if (apply) again.iterations += contact.iterations;
+    again.stage = std::max(again.stage, contact.stage);
+  }
+  const Eigen::VectorXd motions =
+      expand(change, rigid_.empty() ? correction_w_ : correction_strained_, correction_theta_);
+  if (!rigid_.empty()) {
+    WARMSLIP_PETSC(VecCopy(correction_strained_, correction_w_));
+    rigid_.carry(motions, correction_w_);
+  }
+  if (monolithic) {
+    note_temperature(ledger);
+    if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+  }
+  if (contact_) {
+    const Vec moved = momentum_right_;
+    WARMSLIP_PETSC(VecWAXPY(moved, 1, correction_w_, next_.w));
+    settle(again, moved, correction_strained_);
+    WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
+  }
+  note(errors_.u, extents_.u, options_.k * largest_entry(correction_w_),
+       std::max(largest_entry(next_.u), largest_entry(now_.u)), ledger.displacement_scale);
+  if (next_.elastic_u || operators_.viscosity) {
+    const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
+    WARMSLIP_PETSC(VecCopy(change_w, change_u));
+    WARMSLIP_PETSC(VecScale(change_u, options_.k));
+    const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
+    note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
+         1e-8 * there.possible);
+    extents_.force = std::max(extents_.force, ledger.force_scale);
+    if (next_.elastic_u && extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
+      multiply(operators_.elasticity, change_w, momentum_right_);
+      errors_.stress = std::min(errors_.stress, options_.k * largest_entry(momentum_right_) / extents_.force);
+    }
+  }
+  if (contact_) {
+    note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
+         largest_entry(surface_.to_nodes(contact.force)), ledger.contact_scale);
+    correction_force_ = change.force;
+    extents_.force = std::max(extents_.force, ledger.force_scale);
+    if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
+  }
+  if (apply) {
+    if (contact_) contact = std::move(again);
+    WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
+    if (!rigid_.empty()) {
+      WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
+      next_.rigid += motions;
+    }
+  }
+  return true;
+}
+
+template <int d>
+void Stepper<d>::note_temperature(const Ledger& ledger) {
+  note(errors_.theta, extents_.theta, largest_entry(correction_theta_), largest_entry(next_.theta),
+       ledger.temperature_scale);
+}
+
+template <int d>
+void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
+  books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  if (!apply) books_.add_rounding(heat_right_, heat_external_);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
+  solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
+  note_temperature(ledger);
+  if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+}
+
+// Adds the temperature that the estimated errors of velocity and contact force make, by straining and by what the
+// contact leads and rubs, to the change of the temperature. It ends no run: where steps are long, the temperature may
+// hardly feel the motion.
+template <int d>
+void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
+  if (!operators_.heating && !reactive()) return;
+  WARMSLIP_PETSC(VecSet(heat_right_, 0));
+  if (operators_.heating)
+    multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heat_right_);
+  fix(heat_right_, operators_.cooled, nullptr);
+  if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
+  Eigen::VectorXd given = none;
+  if (reactive()) {
+    const Eigen::VectorXd velocity = surface_.nodal_values(next_.w) + surface_.nodal_values(correction_w_),
+                          warmer = surface_.nodal_values(next_.theta) - beside_;
+    const NodalFlow there = flow(loads, next_.contact_force + correction_force_, surface_.at_points(velocity));
+    given = there.given - flow_.given - (there.lost - flow_.lost) * warmer;
+  }
+  solve_heat(heat_right_, heat_external_, given, none, correction_theta_);
+  extents_.theta.tried += largest_entry(correction_theta_);
+}
+
+// The response of the contact; every rank found it, and they agree whether there is one.
+template <int d>
+bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact) {
+  int found = contact_->respond(posed_, correction, contact);
+  MPI_Bcast(&found, 1, MPI_INT, 0, layout_.comm());
+  return found != 0;
+}
+
+// The slip of points that stick, (d points), of which the solver leaves some where their nodes are not points
+// themselves: it is little beside the motion that the contact stops, and may be much beside the straining that is left.
+template <int d>
+Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
+  bool apart = false;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i)
+    apart = apart || (surface_.own_node(i) < 0 && !surface_.prescribed(i));
+  if (!apart) return Eigen::VectorXd::Zero(surface_.points() * d);
+  Eigen::VectorXd out = surface_.at_points(surface_.nodal_values(next_.w));
+  const double tolerated = options_.contact.tolerance * std::max(largest_entry(out), largest_entry(free_));
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Point<d> nu = surface_.normals().row(i).transpose();
+    auto slip = out.template segment<d>(i * d);
+    const bool sticks = contact.status[static_cast<std::size_t>(i)] == Status::stick && !surface_.prescribed(i) &&
+                        posed_.law(static_cast<std::size_t>(i)).friction.regularisation == 0;
+    slip -= slip.dot(nu) * nu;
+    if (!sticks || slip.norm() > tolerated) slip.setZero();  // without a bound it sticks and slips as it likes
+  }
+  return out;
+}
+
+// The velocity (and, monolithic, the temperature) of the step with its contact, to go back to.
+template <int d>
+typename Stepper<d>::Motion Stepper<d>::motion_of(const ContactSolution<d>& contact) const {
+  const auto copy = [](Vec from) {
+    VecHandle to;
+    if (!from) return to;
+    to = duplicate(from);
+    WARMSLIP_PETSC(VecCopy(from, to));
+    return to;
+  };
+  return {copy(next_.w), copy(next_.strained_w), monolithic() ? copy(next_.theta) : VecHandle(), next_.rigid, free_,
+          contact};
+}
+
+template <int d>
+void Stepper<d>::take_back(const Motion& motion, ContactSolution<d>& contact) {
+  WARMSLIP_PETSC(VecCopy(motion.w, next_.w));
+  if (motion.strained_w) WARMSLIP_PETSC(VecCopy(motion.strained_w, next_.strained_w));
+  if (motion.theta) WARMSLIP_PETSC(VecCopy(motion.theta, next_.theta));
+  next_.rigid = motion.rigid;
+  free_ = motion.free;
+  contact = motion.contact;
+}
+
+// Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
+template <int d>
+Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
+  const double enough = options_.refinement, rows = enough / options_.row_refinement;
+  const auto warmth = [&] { return std::max(ledger.heat_defect, rows * ledger.heat_residual); };
+  const auto motion = [&] {
+    return std::max(
+        {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
+  };
+  // a pass whose change is small says that the one before has done its work
+  const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
+  bool refined = false, warmed = false;
+  double warmer = Errors::unknown;
+  const bool creeps = contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
+  if (creeps && correct_motion(loads, ledger, contact, true)) {
+    ledger = balance(complete(loads, contact));
+    ++cost_.refinements;
+    errors_ = {};
+    for (Extent* field : extents_.all()) field->tried = 0;
+  }
+  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
+    const double rest = motion(), error = errors_.largest();
+    const Motion before = motion_of(contact);
+    const bool was_closed = closed(ledger);
+    if (!correct_motion(loads, ledger, contact, true)) break;
+    ledger = balance(complete(loads, contact));
+    ++cost_.refinements;
+    refined = true;
+    if (was_closed && !closed(ledger)) {  // it did harm
+      take_back(before, contact);
+      ledger = balance(complete(loads, contact));
+      break;
+    }
+    if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
+  }
+  for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
+    const double rest = warmth();
+    correct_heat(inputs(loads, contact), ledger, true);
+    products(next_);
+    ledger = balance(inputs(loads, contact));
+    ++cost_.refinements;
+    if (!(warmth() < 0.5 * rest) && warmed && !(errors_.theta < 0.5 * warmer)) break;
+    warmer = errors_.theta;
+    warmed = true;
+  }
+  undetermined_ = contact.undetermined;
+  const bool wanted = measured_now(loads, contact);
+  if (!wanted && !refined && !warmed) return ledger;
+  const int before = substitutions();
+  const bool moved = momentum_ && (refined || wanted);
+  books_.weigh(now_, next_, inputs(loads, contact));
+  if (moved && !undetermined_) undetermined_ = !correct_motion(loads, ledger, contact, false);
+  if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
+  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
+  if (heat_ && moved && !undetermined_) add_heat_of_error(loads);
+  cost_.substitutions -= substitutions() - before;
+  ++cost_.estimates;
+  return ledger;
+}
+
+// Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run
+// that goes on measures the same ones.
+template <int d>
+bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
+  if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
+  for (double step = 1, n = std::round(time_ / options_.k) + 1; step <= n; step *= options_.measured_steps)
+    if (step == n) return true;
+  return false;
+}
+
+// The errors that may end a run: that of a contact that hardly touches is seen beside the other forces.
+template <int d>
+Errors Stepper<d>::weighed() const {
+  Errors out = errors_;
+  out.contact_force *= grazing_;
+  return out;
+}
+
+template class Stepper<2>;
+template class Stepper<3>;
+
+}  // namespace warmslip

@@ -1,0 +1,136 @@
+"""The command line: run a scene, measure, judge and draw. Every error is one sentence a problem and a non-zero exit."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import re
+import sys
+from typing import Annotated, Any
+
+import typer
+from rich.logging import RichHandler
+
+from warmslip.cli import scene, study, verify
+from warmslip.cli.options import console
+from warmslip.scene.errors import SceneError
+from warmslip.simulation import ranks
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+
+LEVELS = ("debug", "info", "warning", "error")
+
+
+@app.callback()
+def logged(
+    log: Annotated[str, typer.Option(help="debug (every step), info (the solver), warning or error")] = "warning",
+) -> None:
+    if log not in LEVELS:
+        raise SceneError(f"--log '{log}' is unknown; use {', '.join(LEVELS)}")
+    logging.basicConfig(
+        level=log.upper(), format="%(message)s", handlers=[RichHandler(console=console, show_path=False)]
+    )
+    for noisy in ("matplotlib", "PIL", "h5py", "numexpr"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+for command in (
+    scene.run,
+    scene.explain,
+    scene.export,
+    scene.view,
+    verify.check,
+    study.study,
+    study.manufactured,
+    study.extremes,
+    study.blocks,
+    study.rates,
+    study.readings,
+    study.work,
+    study.judge,
+    study.draw,
+    verify.verify,
+    verify.report,
+    scene.schema,
+):
+    app.command()(command)
+app.command("list")(scene.list_)
+
+
+def main() -> None:
+    """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
+    try:
+        code = app(
+            prog_name="warmslip", standalone_mode=False
+        )  # else typer draws a box around what is wrong with a call
+        if code == 130:  # typer's word for Ctrl-C
+            _say("interrupted; nothing of this call is kept", everywhere=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except SceneError as error:  # every rank reads the same scene and refuses it alike
+        _say(str(error), everywhere=False)
+        if not ranks.others_come():  # they have read another scene
+            _say(f"the ranks read different scenes; one of them refused: {error}", everywhere=True)
+            ranks.abort(2)
+        sys.exit(2)
+    except Exception as error:
+        if hasattr(error, "format_message"):  # of the call itself; typer brings a click of its own, or uses another's
+            if type(error).__name__ == "NoArgsIsHelpError":
+                error.show()  # type: ignore[attr-defined]
+            else:
+                _say(_misused(error), everywhere=False)
+            sys.exit(2)
+        if os.environ.get("WARMSLIP_DEBUG"):
+            raise
+        message, code = _explain(error)
+        _say(message, everywhere=True)
+        from mpi4py import MPI
+
+        if MPI.COMM_WORLD.size > 1:
+            ranks.abort(code)
+        sys.exit(code)
+
+
+def _misused(error: Any) -> str:
+    """A sentence about a call that has not the form of the command."""
+    context, said = getattr(error, "ctx", None), " ".join(error.format_message().split()).rstrip(".")
+    if context is None:
+        return f"{said[0].lower()}{said[1:]}; see `warmslip --help`"
+    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)$", said):
+        words = extra[1].split()
+        if all("=" in word for word in words) and any(one.name == "set_" for one in context.command.params):
+            return f"a key of the scene needs --set; write {' '.join(f'--set {word}' for word in words)}"
+        return f"'{extra[1]}' is too much for `{context.command_path}`; leave it out, or see its --help"
+    said, near, guess = said.partition(". Did you mean")
+    if near:
+        return f"{said[0].lower()}{said[1:]}; did you mean{guess}"
+    return f"{said[0].lower()}{said[1:]}; see `{context.command_path} --help`"
+
+
+def _explain(error: Exception) -> tuple[str, int]:
+    """A sentence and an exit code: 2 for what the user can mend in the call, 1 for a run that failed."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"the disk is full{where}; make room, then go on from the last checkpoint with --resume", 1
+    if isinstance(error, OSError):
+        where = f" ({error.filename})" if error.filename else ""
+        return f"cannot read or write a file{where}: {error.strerror or error}; check the path and its rights", 2
+    if isinstance(error, ValueError):
+        return str(error), 2
+    if isinstance(error, MemoryError):
+        return "out of memory; use a coarser mesh or more machines", 1
+    if isinstance(error, RuntimeError):
+        return str(error), 1
+    return f"{type(error).__name__}: {error}; this is a defect, WARMSLIP_DEBUG=1 shows where", 1
+
+
+def _say(message: str, *, everywhere: bool) -> None:
+    from mpi4py import MPI
+
+    if everywhere or MPI.COMM_WORLD.rank == 0:
+        for line in message.splitlines():
+            console.print(f"error: {line}", highlight=False, soft_wrap=True, markup=False)
+
+
+if __name__ == "__main__":
+    main()

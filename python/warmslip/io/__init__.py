@@ -1,0 +1,1 @@
+"""Files of a run: the trajectory in HDF5, VTU for ParaView."""

@@ -1,0 +1,165 @@
+"""A stored run for other programs: a series of VTU files that ParaView opens, and its time series as CSV."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import logging
+import re
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from warmslip.io.trajectory import Trajectory
+from warmslip.io.vtu import BODY, three, write_vtu
+from warmslip.model.discretisation import Discretisation
+from warmslip.model.state import contact_fields, resultants
+from warmslip.typing import Array
+
+log = logging.getLogger(__name__)
+
+OWN = re.compile(r"(body|contact)(_\d{4,}\.vtu|\.pvd)")  # the files of a series
+STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
+CONTACT = ("pressure", "friction traction", "gap", "slip", "status")
+FIELDS = (*BODY, *CONTACT)
+
+
+def opened(run: str | Path) -> Trajectory:
+    """The trajectory in the folder of a run. Raises ValueError when there is none."""
+    path = Path(run) / "trajectory.h5"
+    if not path.exists():
+        raise ValueError(f"'{run}' holds no trajectory.h5; give the folder that `warmslip run` wrote")
+    return Trajectory(path)
+
+
+def state_number(t: Trajectory, time: float | None) -> int:
+    """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
+    times = t.time
+    if time is None:
+        return len(times) - 1
+    if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
+        raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
+    return int(np.abs(times - time).argmin())
+
+
+def contact_at(t: Trajectory, d: Discretisation, number: int) -> dict[str, Array]:
+    """Contact fields of a stored state, see `contact_fields`, and the points' displacement; empty where there are none."""
+    step = round(float(t.time[number]) / d.scene.step) - 1
+    if step < 0 or not len(d.surface.weights):
+        return {}
+    force, moved, status, gap = (
+        np.asarray(t.contact(name, step)) for name in ("force", "displacement", "status", "gap")
+    )
+    return contact_fields(d, force, moved, status, gap) | {"displacement": moved}
+
+
+def export(
+    run: str | Path,
+    out: str | Path,
+    *,
+    fields: Collection[str] = FIELDS,
+    times: Sequence[float] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    say: Callable[[str], None] = log.warning,
+) -> int:
+    """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
+
+    body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
+    contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
+    `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
+    contact part, and the ledger of every step. The files of an earlier series in `out` are removed. `say` is called with a
+    sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError for what
+    is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be written.
+    """
+    if isinstance(fields, str) or isinstance(times, str | float | int):
+        name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
+        raise TypeError(f"{name}: {given!r} is no list; write [{given!r}]")
+    for name in fields:
+        if name not in FIELDS:
+            near = difflib.get_close_matches(name, FIELDS, 1)
+            raise ValueError(
+                f"there is no field '{name}'; "
+                + (f"did you mean '{near[0]}'?" if near else f"give one of {', '.join(FIELDS)}")
+            )
+    folder = Path(out)
+    with opened(run) as t:
+        d = t.discretisation()
+        chosen = range(len(t.time)) if times is None else sorted({state_number(t, time) for time in times})
+        if set(fields) != set(FIELDS):  # all that there are
+            fields = _there(t, d, fields, say)
+        for time in times or []:
+            taken = float(t.time[state_number(t, time)])
+            if abs(taken - time) > 1e-9 * d.scene.time.end:
+                say(f"no state is stored at t = {time:g}; the nearest, at t = {taken:g}, is taken")
+        folder.mkdir(parents=True, exist_ok=True)
+        for earlier in folder.iterdir():
+            if OWN.fullmatch(earlier.name):
+                earlier.unlink()
+        _series(t, d, folder / "series.csv")
+        files: list[tuple[float, str]] = []
+        points: list[tuple[float, str]] = []
+        for done, i in enumerate(chosen, start=1):
+            time = float(t.time[i])
+            if set(fields) & set(BODY):
+                u, w, theta = (None if one is None else np.asarray(one[i]) for one in (t.u, t.w, t.theta))
+                write_vtu(folder / f"body_{i:04d}.vtu", d, u, w, theta, fields)
+                files.append((time, f"body_{i:04d}.vtu"))
+            touching = {name: values for name, values in contact_at(t, d, i).items() if name in fields}
+            if touching:
+                _contact(folder / f"contact_{i:04d}.vtu", d, touching)
+                points.append((time, f"contact_{i:04d}.vtu"))
+            if progress:
+                progress(done, len(chosen))
+        for name, series in (("body", files), ("contact", points)):
+            if series:
+                _pvd(folder / f"{name}.pvd", series)
+    return len(chosen)
+
+
+def _there(t: Trajectory, d: Discretisation, fields: Collection[str], say: Callable[[str], None]) -> list[str]:
+    """The fields that the run has; says which it does not have. Raises ValueError when it has none of them."""
+    there = {
+        **dict.fromkeys(("displacement", "velocity", "stress", "von Mises"), t.u is not None),
+        "temperature": t.theta is not None,
+        **dict.fromkeys(CONTACT, len(d.surface.weights) > 0),
+    }
+    missing = [name for name in fields if not there[name]]
+    has = ", ".join(name for name in FIELDS if there[name])
+    if missing and len(missing) == len(fields):
+        raise ValueError(f"the run has no {', '.join(missing)}; choose from {has}")
+    for name in missing:
+        say(f"the run has no {name}, which is left out; it has {has}")
+    return [name for name in fields if there[name]]
+
+
+def _contact(path: Path, d: Discretisation, fields: dict[str, Array]) -> None:
+    x = three(np.asarray(d.surface.positions))
+    meshio.Mesh(
+        x,
+        [("vertex", np.arange(len(x))[:, None])],
+        point_data={name: three(values) for name, values in fields.items()},
+    ).write(path)
+
+
+def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
+    lines = [f'    <DataSet timestep="{time:.17g}" file="{name}"/>' for time, name in files]
+    body = "\n".join(lines)
+    path.write_text(
+        f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n'
+    )
+
+
+def _series(t: Trajectory, d: Discretisation, path: Path) -> None:
+    steps, ledger = t.series("steps"), t.series("ledger")
+    friction = steps["friction_traction"]
+    columns = {"time": steps["time"]} | {name: steps[name] for name in STEPS}
+    columns |= {f"friction_{axis}": friction[:, i] for i, axis in enumerate("xyz"[: friction.shape[1]])}
+    if len(d.surface.weights):
+        columns |= resultants(d, t.series("contact")["force"])
+    columns |= ledger
+    with path.open("w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(columns)
+        out.writerows([f"{value:.17g}" for value in row] for row in zip(*columns.values(), strict=True))

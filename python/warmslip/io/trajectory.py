@@ -1,0 +1,202 @@
+"""A run read from disk: lazy states, contact points, step reports and the ledger of every step, from one HDF5 file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Self
+
+import h5py
+import numpy as np
+
+from warmslip.io.trajectory_writer import LEDGER, REPORT
+from warmslip.model.discretisation import Discretisation, discretise
+from warmslip.scene.reader import build
+from warmslip.typing import Array
+
+CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
+THE_FILE = "give the trajectory.h5 that `warmslip run` wrote"
+DENSEST = 1000  # bytes from a byte of a file that somebody compressed
+
+
+def _check(file: h5py.File) -> None:
+    """Raises ValueError with what is missing or misshapen. A run that was killed may have more rows of one than of another."""
+    nodes, d = _shape(file, "mesh/nodes", "f", None, None)
+    cells = _shape(file, "mesh/cells", "i", None, d + 1)[0]
+    if d not in (2, 3) or not cells or not 0 <= np.min(file["mesh/cells"]) <= np.max(file["mesh/cells"]) < nodes:
+        raise ValueError("mesh/cells names nodes that are not there")
+    _shape(file, "states/time", "f", None)
+    for name, shape in {"u": (nodes, d), "w": (nodes, d), "theta": (nodes,)}.items():
+        if name in file["states"]:
+            _shape(file, f"states/{name}", "f", None, *shape)
+    points = _shape(file, "contact/weights", "f", None)[0]
+    for name, (kind, *more) in CONTACT.items():
+        if points or name in file["contact"]:
+            _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))
+    _shape(file, "steps/time", "f", None)
+    for group, names in (("steps", REPORT), ("ledger", LEDGER)):
+        for name in {*file[group], *names}:
+            _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
+
+
+def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[int, ...]:
+    """The shape of a dataset of a kind of numbers, None standing for any length. Raises ValueError when it has another."""
+    data = file.get(name)
+    if not isinstance(data, h5py.Dataset) or data.dtype.kind != kind:
+        raise ValueError(f"{name} is missing or does not hold numbers of the kind it should")
+    if len(data.shape) != len(shape) or any(n not in (m, None) for m, n in zip(data.shape, shape, strict=True)):
+        raise ValueError(f"{name} has shape {data.shape}")
+    if data.nbytes > DENSEST * file.id.get_filesize():
+        raise ValueError(f"{name} has more numbers than the file can hold")
+    return tuple(data.shape)
+
+
+class Trajectory:
+    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), the `series` of every step, `contact` points.
+
+    A field that the scene does not have is None.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Raises OSError when the file cannot be opened, ValueError when it is no trajectory or a damaged one."""
+        self.path = Path(path)
+        if not self.path.is_file():
+            inside = self.path / "trajectory.h5"
+            cure = f"give '{inside}'" if inside.is_file() else THE_FILE
+            raise FileNotFoundError(f"'{path}' is no file; {cure}")
+        try:
+            try:
+                self._file = h5py.File(self.path, "r", locking=False)  # or a run could not close what somebody reads
+            except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
+                self._file = h5py.File(self.path, "r", libver="latest", swmr=True, locking=False)
+        except OSError as error:
+            if error.errno is not None:  # of the system: rights, a disk
+                raise
+            raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
+        try:
+            self.scene: dict[str, Any] = json.loads(self._file.attrs["scene"])
+            _check(self._file)
+            self._steps, self._states = self._whole()
+            if not self._states:
+                raise ValueError("there is no whole state in it yet")
+        except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
+            self._file.close()
+            raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
+
+    def _whole(self) -> tuple[int, int]:
+        """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
+        file = self._file
+        series = [data for group in ("steps", "ledger") for data in file[group].values()]
+        series += [file[f"contact/{name}"] for name in CONTACT if name in file["contact"]]
+        steps = min(len(data) for data in series)
+        states = min(len(data) for data in file["states"].values())
+        last = file["steps/time"][steps - 1] if steps else 0.0
+        return steps, int(np.sum(np.asarray(file["states/time"][:states]) <= last * (1 + 1e-12)))
+
+    @property
+    def _read(self) -> h5py.File:
+        """The file while it is open. Raises ValueError afterwards, when HDF5 itself would find that there are no fields."""
+        if not self._file:
+            raise ValueError(f"{self.path} is closed; read it inside its `with` block, or open it again")
+        return self._file
+
+    def _state(self, name: str) -> Any:
+        """A field of the whole states: the dataset itself if it has no others."""
+        data = self._read.get(f"states/{name}")
+        return data if data is None or len(data) == self._states else data[: self._states]
+
+    @property
+    def nodes(self) -> Array:
+        """Positions, (nodes, d)."""
+        return np.asarray(self._read["mesh/nodes"])
+
+    @property
+    def cells(self) -> Any:
+        """Nodes of every cell, (cells, d+1)."""
+        return np.asarray(self._read["mesh/cells"])
+
+    @property
+    def time(self) -> Array:
+        """Times of the stored states, (states,)."""
+        return np.asarray(self._state("time"))
+
+    @property
+    def u(self) -> Any:
+        """Displacement, (states, nodes, d), read when indexed."""
+        return self._state("u")
+
+    @property
+    def w(self) -> Any:
+        """Velocity, (states, nodes, d)."""
+        return self._state("w")
+
+    @property
+    def theta(self) -> Any:
+        """Temperature, (states, nodes)."""
+        return self._state("theta")
+
+    def contact(self, name: str, step: int) -> Any:
+        """`force`, `displacement`, `status` or `gap` of the contact points in a step, counted from 0. Raises IndexError."""
+        if not -self._steps <= step < self._steps:
+            raise IndexError(f"there are {self._steps} steps, and none with the number {step}")
+        return self._read[f"contact/{name}"][step % self._steps]
+
+    def discretisation(self) -> Discretisation:
+        """The scene assembled again on this process, with the loads and laws that it states.
+
+        Raises ValueError when that is not the mesh of the run, as its file has changed since.
+        """
+        from mpi4py import MPI
+
+        scene = build(self.scene)
+        if scene.mesh.file is not None and scene.digest() != self._read.attrs.get("digest"):
+            raise ValueError(
+                f"{self.path}: mesh file '{scene.mesh.file}' has changed since the run; put it back as it was"
+            )
+        found = discretise(scene, comm=MPI.COMM_SELF)
+        if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
+            raise ValueError(f"{self.path}: it was run on another mesh than its scene gives; read it through Python")
+        return found
+
+    @property
+    def functions(self) -> list[str]:
+        """What Python functions took the place of the scene's: `loads`, `laws.PART.compliance` ..."""
+        return list(json.loads(self._read.attrs.get("functions", "[]")))
+
+    def series(self, group: str) -> dict[str, Array]:
+        """Every dataset of `steps`, `ledger` or `contact` as arrays."""
+        fixed = () if group in ("steps", "ledger") else ("positions", "normals", "weights", "part")
+        return {
+            name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
+        }
+
+    def xarray(self) -> Any:
+        """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.
+
+        Raises RuntimeError when xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise RuntimeError("xarray is not installed; pip install xarray") from None
+        axes = list("xyz"[: self.nodes.shape[1]])
+        fields = {"u": ("time", "node", "axis"), "w": ("time", "node", "axis"), "theta": ("time", "node")}
+        return xarray.Dataset(
+            {
+                name: (dims, np.asarray(getattr(self, name)))
+                for name, dims in fields.items()
+                if getattr(self, name) is not None
+            },
+            {"time": self.time, "axis": axes, **{a: ("node", self.nodes[:, i]) for i, a in enumerate(axes)}},
+            {"title": self.scene.get("title", "")},
+        )
+
+    def close(self) -> None:
+        """Closes the file; a `with` block does."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()

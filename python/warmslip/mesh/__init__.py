@@ -1,0 +1,1 @@
+"""Meshes from files: read, checked, refined. No compiled code."""

@@ -1,0 +1,1 @@
+"""A scene assembled: loads, contact laws, materials, the discretisation, its states."""

@@ -1,0 +1,286 @@
+"""A scene assembled: mesh, operators, contact surface and loads in the compiled core."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warmslip._core import Backend, ContactOptions, Coupling
+from warmslip._core import largest_strain as largest_principal_strain
+from warmslip._core import stress as cell_stress
+from warmslip._core import stress_out_of_plane as cell_stress_out_of_plane
+from warmslip.messages import quoted
+from warmslip.model.contact_laws import Law, Watched
+from warmslip.model.load_vectors import LoadVectors
+from warmslip.model.loads import Loads, data, evaluate
+from warmslip.model.materials import contact_part, make_mesh, materials, of_dim
+from warmslip.model.prescribed import Clamped
+from warmslip.scene.full import FullScene, full_model
+from warmslip.scene.scene import Scene
+from warmslip.typing import Array
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """Everything of a scene that does not depend on the step size. Matrices are petsc4py objects (`operators.elasticity` ...)."""
+
+    scene: Scene
+    loads: Loads
+    mesh: Any
+    problem: Any
+    layout: Any
+    operators: Any
+    surface: Any
+    norms: Any
+    load_vectors: LoadVectors
+    laws: list[Watched]  # functions in the place of the scene's laws
+    clamped: Clamped  # contact points that supports hold
+    own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
+
+    @property
+    def dim(self) -> int:
+        return self.scene.mesh.dim
+
+    @property
+    def full(self) -> FullScene:
+        """The scene with every block there, see `Scene.full`."""
+        return self.scene if isinstance(self.scene, FullScene) else full_model(self.scene)
+
+    @property
+    def unknowns(self) -> int:
+        """Degrees of freedom of u and theta together, supports included."""
+        return (self.dim * int(self.problem.moves) + int(self.problem.conducts)) * len(self.mesh.nodes)
+
+    def stepper(self, *, backend: str = "automatic", tolerance: float | None = None) -> Any:
+        """A `_core.Stepper` at the initial data; `backend` is automatic, cholmod or petsc. Raises ValueError for another one."""
+        scene = self.scene
+        if backend not in Backend.__members__:
+            raise ValueError(f"backend '{backend}' is unknown; use {', '.join(Backend.__members__)}")
+        options = ContactOptions()
+        if tolerance is not None:
+            options.tolerance = tolerance
+        stepper = of_dim("Stepper", self.dim)(
+            self.layout,
+            self.problem,
+            self.operators,
+            self.surface,
+            k=scene.step,
+            coupling=getattr(Coupling, scene.time.coupling),
+            backend=getattr(Backend, backend),
+            contact=options,
+        )
+        x, initial = np.asarray(self.mesh.nodes), scene.initial
+
+        def start(name: str, components: int) -> Array:
+            value = getattr(initial, name)
+            return evaluate(data(value) if value is not None else 0.0, x, 0.0, components, f"initial.{name}")
+
+        return self.restart(
+            stepper,
+            start("displacement", self.dim),
+            start("velocity", self.dim),
+            start("temperature", 1)[:, 0],
+            0.0,
+        )
+
+    def restart(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
+        """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made what is given on the supports.
+
+        Fields that the problem does not have are left aside.
+        """
+        u, w, theta = u.copy(), w.copy(), theta.copy()
+        for part, (nodes, values) in self.load_vectors.held("displacement", time).items():
+            u[nodes] = values
+            if part not in self.loads.displacement:  # a support that moves has the velocity that is given
+                w[nodes] = 0
+        for nodes, values in self.load_vectors.held("temperature", time).values():
+            theta[nodes] = values[:, 0]
+        return self.state(stepper, u, w, theta, time)
+
+    def state(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
+        """Sets the state as it is given, see `restart`."""
+        vectors: list[Any] = [None, None, None]
+        for i, (there, values) in enumerate(
+            ((self.problem.moves, u), (self.problem.moves, w), (self.problem.conducts, theta))
+        ):
+            if there:
+                vectors[i] = self.distributed(values)
+        stepper.start(*vectors, self.load_vectors.on_points("gap", time), time)
+        for vector in vectors:
+            if vector is not None:
+                vector.destroy()  # petsc4py would only mark it for a later collection
+        return stepper
+
+    def distributed(self, values: Array) -> Any:
+        """A new vector of values in mesh numbering, (nodes, d) or (nodes,). Collective."""
+        vector = self.layout.vector(1 if values.ndim == 1 else self.dim)
+        self.layout.distribute(values.ravel(), vector)
+        return vector
+
+    def field(self, vec: Any) -> Any:
+        """A vector in mesh numbering on every rank: (nodes, d), or (nodes,) for theta; None for no vector. Collective."""
+        if vec is None:
+            return None
+        values = np.asarray(self.layout.gather(vec))
+        return values if len(values) == len(self.mesh.nodes) else values.reshape(len(self.mesh.nodes), -1)
+
+    def stress(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Cauchy stress (2.1) at the centroids, (cells, d, d); None for a field the problem does not have."""
+        return np.asarray(cell_stress(self.problem, *self._fields(u, w, theta))).reshape(-1, self.dim, self.dim)
+
+    def stress_zz(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Stress along z of a plane at the centroids, (cells,), see `materials.out_of_plane`; 0 in plane stress, and in space."""
+        return np.asarray(cell_stress_out_of_plane(self.problem, *self._fields(u, w, theta)))
+
+    def _fields(self, u: Array | None, w: Array | None, theta: Array | None) -> tuple[Array, Array, Array]:
+        none = np.empty((0, self.dim))
+        return none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
+
+    def largest_strain(self, u: Array) -> float:
+        """Largest principal strain, in size, of all cells for a nodal displacement (nodes, d); dimensionless."""
+        return largest_principal_strain(self.mesh, u)
+
+    def mises_of(self, u: Array | None, w: Array | None, theta: Array | None) -> Array:
+        """Von Mises stress of nodal fields at the centroids, (cells,); that of a plane counts the stress along z."""
+        return von_mises(self.stress(u, w, theta), self.stress_zz(u, w, theta) if self.dim == 2 else None)
+
+    def straining(self, stepper: Any) -> tuple[Any, Any, Any]:
+        """Displacement and velocity (nodes, d) but for rigid motions, which strain nothing, and temperature (nodes,). Collective.
+
+        A body without supports may move by more digits than its strain has; the core keeps the two apart.
+        """
+        u, w = stepper.strained, stepper.strained_w
+        return tuple(self.field(v) for v in (u or stepper.u, w or stepper.w, stepper.theta))
+
+    def mises(self, stepper: Any) -> Array:
+        """Von Mises stress of a stepper's state, (cells,). Collective."""
+        return self.mises_of(*self.straining(stepper))
+
+
+def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched]:
+    """The laws, each on a part that touches and tried on samples. Raises ValueError, TypeError for what is no Law."""
+    tried: dict[str, Watched] = {}
+    touching = [contact.part for contact in scene.contacts if contact.stiffness is not None]
+    for part, law in laws.items():
+        if part not in touching:
+            known = ", ".join(touching) or "none has"
+            raise ValueError(
+                f"laws.{part}: no contact part with a stiffness is called so ({known}); the scene says what touches, even "
+                "where a law takes the place of its stiffness"
+            )
+        if not isinstance(law, Law):
+            raise TypeError(f"laws['{part}'] is {law!r}; give a Law, such as Law(friction=...)")
+        tried[part] = law.tried(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
+        log.warning(
+            "laws.%s: evaluated in Python at every contact point and iteration, slower than the scene's own laws", part
+        )
+    return tried
+
+
+def refuse_types(scene: Any, loads: Any, laws: Any) -> None:
+    """Raises TypeError, in a sentence, for what is easily given in the place of a scene, of loads or of laws."""
+    if not isinstance(scene, Scene):
+        cure = (
+            "read it with warmslip.load"
+            if isinstance(scene, str | Path)
+            else "warmslip.load and warmslip.Scene make one"
+        )
+        raise TypeError(f"scene: {quoted(scene)} is no Scene; {cure}")
+    if loads is not None and not isinstance(loads, Loads):
+        cure = "write dataclasses.replace(warmslip.Loads.of(scene), body=...) with the names of those that change"
+        raise TypeError(f"loads: {quoted(loads)} is no warmslip.Loads; {cure}")
+    if laws is not None and not isinstance(laws, dict):
+        raise TypeError(f"laws: {quoted(laws)} is no dictionary; give laws by part, {{'bottom': warmslip.Law(...)}}")
+
+
+def discretise(
+    scene: Scene,
+    *,
+    comm: Any = None,
+    loads: Loads | None = None,
+    laws: dict[str, Law] | None = None,
+    mesh: Any = None,
+) -> Discretisation:
+    """Assembles a scene on a communicator (default: all ranks).
+
+    `loads` replaces the scene's, `mesh` its mesh, and `laws` the contact laws of the parts it names. Collective. Raises
+    TypeError for what is no scene, loads or laws, ValueError when the contact part has no free node, a law is none, or a support
+    that stays where it is holds a part inside a rigid foundation.
+    """
+    from mpi4py import MPI
+
+    refuse_types(scene, loads, laws)
+    comm = MPI.COMM_WORLD if comm is None else comm
+    d = scene.mesh.dim
+    given_loads = loads is not None
+    loads = loads or Loads.of(scene)
+    mesh = make_mesh(scene) if mesh is None else mesh
+    watched = _checked(laws or {}, scene, mesh)
+    own = ["loads"] * given_loads + [name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)]
+    given, regions = materials(scene, mesh)
+    problem = of_dim("Problem", d)(
+        mesh=mesh,
+        materials=given,
+        regions=regions,
+        clamped=list(scene.supports.displacement),
+        cooled=list(scene.supports.temperature),
+        contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
+        lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
+    )
+    layout = of_dim("Layout", d)(comm, mesh)
+    surface = of_dim("ContactSurface", d)(layout, problem)
+    held = {node for part in scene.supports.displacement for node in np.unique(mesh.parts[part])}
+    for contact in scene.contacts:
+        if contact.stiffness is not None and held.issuperset(np.unique(mesh.parts[contact.part])):
+            raise ValueError(
+                f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
+            )
+    operators = of_dim("Operators", d)(layout, problem)
+    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
+    rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in own)
+    clamped = Clamped(scene, mesh, surface, loads, vectors, rigid)
+    if not clamped.of_time and (why := clamped.inside(0.0)):
+        raise ValueError(f"supports.displacement: {why}")
+    return Discretisation(
+        scene,
+        loads,
+        mesh,
+        problem,
+        layout,
+        operators,
+        surface,
+        of_dim("Norms", d)(layout),
+        vectors,
+        list(watched.values()),
+        clamped,
+        own,
+    )
+
+
+def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
+    """L2 norm and maximum of the von Mises stress of a stepper's state, at the cells' centroids (collective)."""
+    mises = d.mises(stepper)
+    x = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
+    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if d.dim == 2 else 6)
+    return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
+
+
+def von_mises(stress: Array, zz: Array | None = None) -> Array:
+    """sqrt(3/2 s:s) with s the deviator of the stress (cells, d, d), as (cells,).
+
+    Of a plane, `zz` (cells,) is the stress along z, 0 unless given, and its shear stresses along z are 0.
+    """
+    full = np.zeros((len(stress), 3, 3))
+    d = stress.shape[1]
+    full[:, :d, :d] = stress
+    if zz is not None:
+        full[:, 2, 2] = zz
+    deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+    with np.errstate(over="ignore"):  # a run that overflowed is drawn as far as it came
+        return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))

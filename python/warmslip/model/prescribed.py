@@ -1,0 +1,101 @@
+"""Contact points that supports hold: no motion mends what of them lies inside a rigid foundation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warmslip.model.load_vectors import LoadVectors
+from warmslip.model.loads import Loads, of_time
+from warmslip.scene.scene import Scene
+from warmslip.typing import Array
+
+ROUNDING = 1e-12  # relative to displacement and gap: what the law of contact does not see
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """Of one problem; `own` names the parts whose compliance is a function of the user's."""
+
+    scene: Scene
+    mesh: Any
+    surface: Any
+    loads: Loads
+    vectors: LoadVectors
+    own: frozenset[str]
+
+    @cached_property
+    def _points(self) -> list[tuple[int, Any, Array]]:
+        """Number, nodes and their weights of every contact point on a rigid foundation whose nodes are all held."""
+        held = np.zeros(len(self.mesh.nodes), dtype=bool)
+        for part in self.scene.supports.displacement:
+            held[np.unique(self.mesh.parts[part])] = True
+        of_part = np.asarray(self.surface.contacts, dtype=int)
+        out: list[tuple[int, Any, Array]] = []
+        for i, contact in enumerate(self.scene.contacts):
+            facets = np.asarray(self.mesh.parts[contact.part])
+            if contact.stiffness is None or not np.isinf(contact.compliance) or contact.part in self.own:
+                continue
+            points = np.flatnonzero(of_part == i)
+            if not len(points) or not held[facets].any():
+                continue
+            places = np.asarray(self.surface.positions)[points]
+            if contact.quadrature == "nodal":
+                out += _at_nodes(points, places, np.asarray(self.mesh.nodes), np.unique(facets[held[facets]]))
+            else:
+                out += _on_facets(points, places, np.asarray(self.mesh.nodes), facets[held[facets].all(axis=1)])
+        return out
+
+    @property
+    def of_time(self) -> bool:
+        """Whether supports or gaps of such points change in time."""
+        gaps = [self.loads.on_contact("gap", i) for i, c in enumerate(self.scene.contacts) if c.stiffness is not None]
+        return bool(self._points) and any(map(of_time, [*self.loads.displacement.values(), *gaps]))
+
+    def inside(self, t: float) -> str:
+        """Which of them is deepest inside at time t, with its cure; "" where none is (collective)."""
+        if not self._points:
+            return ""
+        nodes, normals = np.asarray(self.mesh.nodes), np.asarray(self.surface.normals)
+        moved = np.zeros_like(nodes)
+        for at, values in self.vectors.held("displacement", t).values():
+            moved[at] = values
+        gap = self.vectors.on_points("gap", t)
+        deepest, place, part = 0.0, np.zeros(0), ""
+        for point, at, weights in self._points:
+            across = float(weights @ moved[at] @ normals[point])
+            depth = across - float(gap[point])
+            if depth > max(deepest, ROUNDING * (np.abs(moved[at]).max() + abs(gap[point]))):
+                contact = self.scene.contacts[int(self.surface.contacts[point])]
+                deepest, place, part = depth, weights @ nodes[at], contact.part
+        if deepest == 0:
+            return ""
+        where = ", ".join(f"{one:.4g}" for one in place)
+        return (
+            f"a support holds '{part}' {deepest:.3g} inside its rigid foundation at ({where}) at t = {t:.4g}, which no motion "
+            "can mend; widen contact.gap there by as much, move the support out, or give a finite contact.stiffness"
+        )
+
+
+def _at_nodes(points: Any, places: Array, nodes: Array, held: Any) -> Iterator[tuple[int, Any, Array]]:
+    distance, found = cKDTree(nodes[held]).query(places)
+    for point, away, node in zip(points, distance, held[found], strict=True):
+        if away <= ROUNDING * np.ptp(nodes, axis=0).max():
+            yield int(point), np.array([node]), np.ones(1)
+
+
+def _on_facets(points: Any, places: Array, nodes: Array, facets: Any) -> Iterator[tuple[int, Any, Array]]:
+    tree = cKDTree(places)
+    for facet in facets:
+        corners = nodes[facet]
+        middle = corners.mean(axis=0)
+        for i in tree.query_ball_point(middle, np.linalg.norm(corners - middle, axis=1).max()):
+            weights = np.linalg.lstsq(np.vstack([corners.T, np.ones(len(facet))]), [*places[i], 1.0], rcond=None)[0]
+            on = np.abs(weights @ corners - places[i]).max() <= 1e-9 * np.ptp(nodes, axis=0).max()
+            if on and weights.min() > 0:
+                yield int(points[i]), facet, weights

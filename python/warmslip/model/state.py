@@ -1,0 +1,106 @@
+"""A state of a run as arrays in mesh numbering, and what its contact points feel under the usual names."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from warmslip.model.discretisation import Discretisation
+from warmslip.typing import Array
+
+
+class State:
+    """What a stepper holds after a step. Arrays are gathered when they are first asked for, on all ranks together (collective).
+
+    A state that was not read in time, before the next step, raises RuntimeError.
+    """
+
+    def __init__(self, discretisation: Discretisation, stepper: Any, step: int) -> None:
+        self.discretisation, self._stepper, self.step = discretisation, stepper, step
+        self.time = float(stepper.time)
+
+    def _now(self) -> Any:
+        if self._stepper.time != self.time:
+            raise RuntimeError(f"the state of step {self.step} was not read before the next step; read it in the loop")
+        return self._stepper
+
+    @cached_property
+    def u(self) -> Any:
+        """Displacement, length, (nodes, d); None when nothing moves."""
+        return self.discretisation.field(self._now().u)
+
+    @cached_property
+    def w(self) -> Any:
+        """Velocity, (nodes, d); None when nothing moves."""
+        return self.discretisation.field(self._now().w)
+
+    @cached_property
+    def theta(self) -> Any:
+        """Temperature, (nodes,); None without heat."""
+        return self.discretisation.field(self._now().theta)
+
+    def _moving(self) -> Any:
+        return self._now().u
+
+    @cached_property
+    def _straining(self) -> tuple[Any, Any, Any]:
+        return self.discretisation.straining(self._now())
+
+    @cached_property
+    def stress(self) -> Array | None:
+        """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
+        return None if self._moving() is None else self.discretisation.stress(*self._straining)
+
+    @cached_property
+    def stress_zz(self) -> Array | None:
+        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
+        return None if self._moving() is None else self.discretisation.stress_zz(*self._straining)
+
+    @cached_property
+    def mises(self) -> Array | None:
+        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
+        return None if self._moving() is None else self.discretisation.mises_of(*self._straining)
+
+    @cached_property
+    def contact(self) -> dict[str, Array]:
+        """See `contact_fields`."""
+        now, shape = self._now(), (-1, self.discretisation.dim)
+        force, moved = np.reshape(now.contact_force, shape), np.reshape(now.contact_displacement, shape)
+        gap = self.discretisation.load_vectors.on_points("gap", self.time)
+        return contact_fields(self.discretisation, force, moved, now.status, gap)
+
+
+def contact_fields(d: Discretisation, force: Array, displacement: Array, status: Any, gap: Array) -> dict[str, Array]:
+    """Pressure and friction traction on the body (stress), gap g - u_nu and slip u_tau (length), status, at the points.
+
+    `force` of the body on the foundation and `displacement` are (points, d), `status` 0 open, 1 stick, 2 slip, `gap` g (points,).
+    The points are those of `discretisation.surface`.
+    """
+    normals, weights = np.asarray(d.surface.normals), np.asarray(d.surface.weights)
+    normal_force, inwards = np.sum(force * normals, axis=1), np.sum(displacement * normals, axis=1)
+    return {
+        "pressure": normal_force / weights,
+        "friction traction": -(force - normal_force[:, None] * normals) / weights[:, None],
+        "gap": gap - inwards,
+        "slip": displacement - inwards[:, None] * normals,
+        "status": np.asarray(status, dtype=float),
+    }
+
+
+def resultants(d: Discretisation, force: Array) -> dict[str, Array]:
+    """Normal force and friction force on the body of every contact part: `normal_force PART` and `friction_x PART` ...
+
+    `force` is (steps, points, d); each result (steps,).
+    """
+    normals, of_part = np.asarray(d.surface.normals), np.asarray(d.surface.contacts, dtype=int)
+    pressing = np.sum(force * normals, axis=2)
+    friction = -(force - pressing[..., None] * normals)
+    found: dict[str, Array] = {}
+    for number in np.unique(of_part):
+        part, on = d.scene.contacts[number].part, of_part == number
+        found[f"normal_force {part}"] = pressing[:, on].sum(axis=1)
+        for axis in range(d.dim):
+            found[f"friction_{'xyz'[axis]} {part}"] = friction[:, on, axis].sum(axis=1)
+    return found

@@ -1,0 +1,1 @@
+"""A run for people: its cost in advance, its page afterwards."""

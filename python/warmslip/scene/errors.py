@@ -1,0 +1,93 @@
+"""What is wrong with a scene, in sentences with the key and the cure."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from warmslip.messages import quoted
+from warmslip.scene.types import Table
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run; the message is one sentence a problem, each with its key and its cure."""
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def validated(data: dict[str, Any], model: type[M]) -> M:
+    """The model of some data, such as a scene. Raises SceneError with all problems at once."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        # a union of types gives one error a member: the first tells what is wrong
+        first: dict[str, str] = {}
+        for e in error.errors():
+            where = _where(e, data)
+            first.setdefault(_key(where), _sentence(e, where, model))
+        raise SceneError("\n".join(first.values())) from None
+
+
+def _where(error: Any, data: Any) -> list[str]:
+    """The keys that lead to a problem; pydantic puts names of types and tags between them, which no table here has."""
+    found, place = [], data
+    for part in error["loc"]:
+        if part in place if isinstance(place, dict) else isinstance(place, list | tuple) and isinstance(part, int):
+            found.append(str(part))
+            place = place[part]
+    return [*found, str(error["loc"][-1])] if error["type"] == "missing" else found
+
+
+def _key(where: list[str]) -> str:
+    return ".".join(where) or "scene"
+
+
+def _sentence(error: Any, where: list[str], model: type[BaseModel]) -> str:
+    key, given = _key(where), quoted(error.get("input"))
+    match error["type"]:
+        case "extra_forbidden":
+            allowed = _allowed(where[:-1], model)
+            near = difflib.get_close_matches(where[-1], allowed, 1)
+            hint = f"did you mean '{near[0]}'?" if near else f"the keys here are {', '.join(allowed)}"
+            return f"{key}: unknown key; {hint}"
+        case "missing":
+            return f"{key}: missing; add it"
+        case "value_error":
+            message = str(error["ctx"]["error"])
+            return message if key == "scene" else f"{key}: {message}"
+        case "model_type":
+            return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where, model))}"
+        case "list_type":
+            return f"{key} = {given} is no list; write [{given}]"
+        case "string_pattern_mismatch" if key.endswith("quadrature"):
+            return f"{key} = {given} is unknown; use nodal, or gauss-1 to gauss-8"
+        case "literal_error" if key.endswith("stiffness"):
+            return f"{key} = {given} is neither a number nor 'rigid'; write a number without quotes and with a decimal point"
+        case "finite_number":
+            return f"{key}: {given} is not a finite number; give one"
+        case _:
+            return f"{key} = {given}: {error['msg'][0].lower()}{error['msg'][1:]}; correct the value"
+
+
+def _allowed(where: list[str], root: type[BaseModel]) -> list[str]:
+    """The keys of the table at a place; numbers and free names lead into lists and tables of tables."""
+    model: Any = root
+    free = False  # the next part is a name that the user chose
+    for part in where:
+        fields = getattr(model, "model_fields", {})
+        if free or part.isdigit():
+            free = False
+            continue
+        model = _table(fields[part].annotation) if part in fields else None
+        free = part in fields and get_origin(fields[part].annotation) is dict
+    return sorted(getattr(model, "model_fields", {}))
+
+
+def _table(annotation: Any) -> Any:
+    """The table in a type such as ContactTable | list[ContactTable] | None, or None."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((table for table in map(_table, get_args(annotation)) if table is not None), None)

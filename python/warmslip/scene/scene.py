@@ -1,0 +1,42 @@
+"""A scene: what a user asks for, typed and checked before anything is assembled. No compiled code is needed here."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any, Self
+
+from pydantic import model_validator
+
+from warmslip.mesh import files
+from warmslip.scene.errors import validated
+from warmslip.scene.overrides import replace
+from warmslip.scene.tables import SceneTables
+from warmslip.scene.validation import problems
+
+
+class Scene(SceneTables):
+    """A whole scene. Tables are blocks of the problem, and what is absent costs nothing; keys are those of the TOML file."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if found := problems(self):
+            raise ValueError("\n".join(found))
+        return self
+
+    def digest(self) -> str:
+        """A hash of the resolved scene and of its mesh file."""
+        data = json.dumps(self.resolved(), sort_keys=True)
+        if self.mesh.file is not None:
+            data += files.read(self.mesh.file).digest
+        return hashlib.sha256(data.encode()).hexdigest()[:16]
+
+    def override(self, **values: Any) -> Self:
+        """The scene with some keys replaced, dots written as in `override(**{"mesh.n": 64})`, None to leave a table out.
+
+        Raises SceneError.
+        """
+        data = self.model_dump(mode="json", exclude_none=True, exclude_unset=True)  # what was left open stays so
+        for key, value in values.items():
+            replace(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
+        return validated(data, type(self))

@@ -1,0 +1,1 @@
+"""The time loop: run, statistics, checkpoint, summary."""

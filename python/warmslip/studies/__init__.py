@@ -1,0 +1,1 @@
+"""Measuring: errors, rates, refinement studies, robustness, cost."""

@@ -1,0 +1,185 @@
+"""The refinement study of a scene: every member of an h,k grid marches beside the reference and is measured as it goes.
+
+All members share the clock of the reference, so nothing is stored: at each time that a member reaches, its distance to
+the reference is measured and its maximum kept. Members on one mesh share their operators; each step size has its factors.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import resource
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from warmslip._core import compiler, petsc_version
+from warmslip.model.discretisation import Discretisation, discretise, stress_measures
+from warmslip.records import provenance
+from warmslip.scene.errors import SceneError
+from warmslip.scene.scene import Scene
+from warmslip.simulation.run import IDENTITIES, Run
+from warmslip.simulation.summary import petsc_options
+from warmslip.studies.error_norms import Comparison, Largest
+
+
+def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int]]:
+    """(1/h, steps) of the grid: `diagonal` has h = k, `full` every pair; the reference itself is not a member.
+
+    Raises SceneError for a reference that is not finer than every level, levels that repeat, or sizes that are not nested.
+    """
+    if max(levels) >= reference:
+        raise SceneError(
+            f"the reference 1/{reference} is not finer than the level 1/{max(levels)}; give a larger --reference"
+        )
+    if len(set(levels)) < len(levels):
+        raise SceneError(f"levels {levels} name a size twice; name each once")
+    if any(reference % level for level in levels):
+        raise SceneError(
+            f"levels {levels} do not divide the reference {reference}; meshes and times would not be nested"
+        )
+    if grid == "diagonal":
+        return [(n, n) for n in levels]
+    sizes = [*levels, reference]
+    return [(n, m) for n in sizes for m in sizes if (n, m) != (reference, reference)]
+
+
+def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
+    """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
+    s, d = job.stepper, job.discretisation
+    cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
+    report, moves = job.report, d.problem.moves
+    return (
+        {
+            "n": job.scene.mesh.level,
+            "steps": job.scene.time.steps,
+            "h": 1 / job.scene.mesh.level,
+            "k": job.scene.step,
+        }
+        | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
+        | {"outcome": job.outcome}
+        | {f"identity_{name}": job.worst[name] for name in IDENTITIES}
+        | {
+            "norm_u_V": d.norms.v(s.u) if moves else 0.0,
+            "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
+            "norm_w_L2": d.norms.l2(s.w) if moves else 0.0,
+            "norm_theta_L2": d.norms.l2(s.theta) if d.problem.conducts else 0.0,
+        }
+        | stress_measures(d, s)
+        | {
+            "normal_force": report.normal_force if report else 0.0,
+            "tangential_force": float(np.linalg.norm(report.friction_traction)) if report else 0.0,
+            "max_penetration": report.max_penetration if report else 0.0,
+            "open": report.open if report else 0,
+            "stick": report.stick if report else 0,
+            "slip": report.slip if report else 0,
+            "newton_largest": job.newton_max,
+            "safeguarded_steps": sum(count for stage, count in job.stages.items() if stage != "newton"),
+            "unknowns": d.unknowns,
+            "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
+        }
+        | cost
+    )
+
+
+def study(
+    scene: Scene,
+    *,
+    levels: list[int],
+    reference: int,
+    grid: str = "diagonal",
+    pace: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[dict[str, Any]]:
+    """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
+
+    A level is the number of bricks along the first axis, the other axes keep their ratio to it, and of steps, times `pace`. For a
+    mesh from a file it is 1, 2, 4, ..: into how many pieces an edge is cut. The pace is 1 unless it is given, for a file the
+    scene's steps. h is relative to the first side, or to the file's. Numbers of a field that the scene does not have are 0.
+
+    Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
+    Raises RuntimeError naming the member when a run does not end right.
+    """
+    if scene.mesh.refine:
+        raise SceneError("mesh.refine: the levels of a study refine the file themselves; leave it out")
+    if any(ratio != 1 for ratio in scene.mesh.grading or []):
+        raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
+    if pace is None:
+        pace = scene.time.steps if scene.mesh.file is not None else 1
+    if pace < 1:
+        raise SceneError(f"--pace {pace} is no number of steps; give 1 or more")
+    meshes: dict[int, Discretisation] = {}
+
+    def job(n: int, steps: int) -> Run:
+        one = scene.override(**_mesh(scene, n), **{"time.steps": pace * steps})
+        if n not in meshes:
+            meshes[n] = discretise(one)
+        return Run(one, discretisation=replace(meshes[n], scene=one))
+
+    finest = job(reference, reference)
+    runs = [(job(n, m), Largest()) for n, m in members(levels, reference, grid)]
+    compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
+    steps = {id(run): run.steps() for run, _ in runs}
+    marching = finest.steps()
+    for n in range(1, pace * reference + 1):
+        _next(marching, finest)
+        for run, largest in runs:
+            if n % (pace * reference // run.scene.time.steps) == 0:
+                _next(steps[id(run)], run)
+                largest.add(compare[run.scene.mesh.level].difference(run.stepper, finest.stepper))
+        if progress:
+            progress(n, pace * reference)
+    return [*(row(run, largest.values) for run, largest in runs), row(finest, None)]
+
+
+def _mesh(scene: Scene, level: int) -> dict[str, Any]:
+    """The key of the mesh of a level. Raises SceneError for a level that this mesh does not have."""
+    if scene.mesh.file is not None:
+        if level & (level - 1) or level > 64:
+            why = "no power of two" if level & (level - 1) else "more than 64"
+            raise SceneError(f"a mesh from a file is halved: level {level} is {why}; give --levels 1,2,4 --reference 8")
+        return {"mesh.refine": level.bit_length() - 1}
+    counts = scene.mesh.counts
+    if any(level * count % counts[0] for count in counts):
+        least = counts[0] // math.gcd(*counts)
+        raise SceneError(
+            f"mesh.n = {counts}: level {level} cannot keep the ratio of the axes; give multiples of {least}"
+        )
+    axes = [level * count // counts[0] for count in counts]
+    return {"mesh.n": level if len(set(axes)) == 1 else axes}
+
+
+def _next(steps: Any, run: Run) -> None:
+    if next(steps, None) is None:
+        m = run.scene
+        raise RuntimeError(
+            f"the run with n = {m.mesh.level}, steps = {m.time.steps} ended after {run.stepper.cost.steps} steps: {run.outcome}"
+        )
+
+
+def stamp(scene: Scene | None, **more: Any) -> dict[str, Any]:
+    """Provenance of a table."""
+    return provenance.stamp(
+        scene,
+        petsc=petsc_version,
+        compiler=compiler,
+        ranks=MPI.COMM_WORLD.size,
+        petsc_options=petsc_options(),
+        peak_memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        **more,
+    )
+
+
+def write(path: Path, table: list[dict[str, Any]], record: dict[str, Any]) -> None:
+    """The table as CSV with 17 digits, and its stamp beside it as .json."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(table[0])
+        out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in line.values()] for line in table)
+    path.with_suffix(".json").write_text(json.dumps(record, indent=2) + "\n")

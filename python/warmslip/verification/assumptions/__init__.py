@@ -1,0 +1,1 @@
+"""The assumptions of the theory, held against a scene."""

@@ -1,0 +1,1 @@
+"""Meshes and steps graded to where the solution is singular."""

@@ -1,0 +1,1 @@
+"""Manufactured solutions: fields first, data derived from them."""

@@ -1,0 +1,1 @@
+"""The paper's existence proof and error bound, run as computations."""
