@@ -20,16 +20,17 @@ if TYPE_CHECKING:
     from warmslip.model.discretisation import Discretisation, discretise
     from warmslip.model.loads import Loads
     from warmslip.model.state import State
-    from warmslip.simulation.run import Result, Run, run
+    from warmslip.simulation.run import Result, run
+    from warmslip.simulation.simulation import Simulation
 
 __all__ = [
     "Discretisation",
     "Law",
     "Loads",
     "Result",
-    "Run",
     "Scene",
     "SceneError",
+    "Simulation",
     "State",
     "Trajectory",
     "discretise",
@@ -44,7 +45,7 @@ _LAZY = {
     "Discretisation": "model.discretisation",
     "discretise": "model.discretisation",
     "Result": "simulation.run",
-    "Run": "simulation.run",
+    "Simulation": "simulation.simulation",
     "run": "simulation.run",
     "State": "model.state",
     "Trajectory": "io.trajectory",

@@ -14,7 +14,9 @@ import pytest
 from reference import scipy_scheme
 
 import warmslip
-from warmslip import Run, Scene
+from warmslip import Scene
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 Benchmark = Any
 NORMS = ("u_V", "u_L2", "w_L2", "theta_L2")
@@ -30,8 +32,8 @@ def scene(n: int, steps: int | None = None, **keys: Any) -> Scene:
     return warmslip.load("paper_mixed").override(**values | {k.replace("__", "."): v for k, v in keys.items()})
 
 
-def norms(job: Run) -> dict[str, float]:
-    found = job.summary()["norms"]
+def norms(job: Simulation) -> dict[str, float]:
+    found = summary(job)["norms"]
     return {name: found[name] for name in NORMS}
 
 
@@ -48,11 +50,11 @@ def _say(benchmark: Benchmark, capsys: pytest.CaptureFixture[str]) -> Callable[.
     return say
 
 
-def step_to(job: Run) -> None:
+def step_to(job: Simulation) -> None:
     for _ in job.steps():
         pass
     assert job.outcome == "right"
-    assert max(job.worst.values()) <= 1e-11
+    assert max(job.statistics.residuals.values()) <= 1e-11
 
 
 def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
@@ -60,9 +62,9 @@ def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
     n = int(os.environ.get("WARMSLIP_BENCH_N", "256"))
     pairs: list[float] = []
 
-    def reference() -> Run:
+    def reference() -> Simulation:
         start = time.process_time()
-        job = Run(scene(n))
+        job = Simulation(scene(n))
         s, d = job.stepper, job.discretisation
         right, heat = d.layout.vector(2), d.layout.vector(1)
         x, theta = right.duplicate(), heat.duplicate()
@@ -96,7 +98,7 @@ def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
         factor_MiB=cost.factor_bytes / 2**20,
         newton_iterations=cost.newton_iterations,
     )
-    assert max(job.worst.values()) <= 1e-11
+    assert max(job.statistics.residuals.values()) <= 1e-11
     if n in STORED:
         assert list(norms(job).values()) == pytest.approx(STORED[n], rel=1e-9)
     else:
@@ -112,8 +114,8 @@ def test_step_against_scipy(benchmark: Benchmark, say: Callable[..., None]) -> N
     n = steps = 128
     seconds: dict[str, list[float]] = {"ours": [], "plain": [], "stored": []}
 
-    def alternate() -> tuple[Run, list[Any]]:
-        job = Run(scene(n, steps))
+    def alternate() -> tuple[Simulation, list[Any]]:
+        job = Simulation(scene(n, steps))
         step_to(job)
         seconds["ours"].append(job.stepper.cost.step_seconds)
         results = [scipy_scheme.simulate("mixed", 10.0, n, steps, keep="final", store=store) for store in (False, True)]
@@ -148,8 +150,8 @@ def test_choices(benchmark: Benchmark, say: Callable[..., None], base: dict[str,
     """What a choice costs a step at h = k = 1/64."""
     seconds: tuple[list[float], list[float]] = ([], [])
 
-    def alternate() -> list[Run]:
-        jobs = [Run(scene(64, **keys)) for keys in (base, other)]
+    def alternate() -> list[Simulation]:
+        jobs = [Simulation(scene(64, **keys)) for keys in (base, other)]
         for job, times in zip(jobs, seconds, strict=True):
             step_to(job)
             times.append(job.stepper.cost.step_seconds / job.stepper.cost.steps)

@@ -31,6 +31,7 @@ from reference.extended_scheme import Scheme, State
 from warmslip.scene.errors import SceneError
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
+from warmslip.simulation.summary import summary
 
 TOLERANCE = 1e-6  # of a field, relative to its largest value in the run
 HELD = 1e-9  # doubles can hold an answer that one unit in the last place of the data moves by no more
@@ -56,11 +57,11 @@ class Ran:
 
 def run(scene: Scene, backend: str = "automatic") -> Ran:
     """Runs a scene, in memory. Refusals and failures become outcomes: `refused`, `crash`."""
-    from warmslip.simulation.run import Run
+    from warmslip.simulation.simulation import Simulation
 
     began = time.perf_counter()
     try:
-        job = Run(scene, backend=backend)
+        job = Simulation(scene, backend=backend)
     except (SceneError, ValueError) as error:
         return Ran("refused", str(error).replace("\n", " "), seconds=time.perf_counter() - began)
     ran, surface = Ran(""), job.discretisation.surface
@@ -77,7 +78,7 @@ def run(scene: Scene, backend: str = "automatic") -> Ran:
     ran.outcome = job.outcome
     if job.failure:
         ran.reason = f"step {job.failure['step']}: {job.failure['reason']}"
-    ran.digits = job.summary().get("digits", "")
+    ran.digits = summary(job).get("digits", "")
     ran.seconds = time.perf_counter() - began
     return ran
 

@@ -131,7 +131,7 @@ def test_frictional_heat_goes_into_the_body() -> None:
             "friction_heating": {"share": 0.5},
         },
     )
-    run = warmslip.Run(scene)
+    run = warmslip.Simulation(scene)
     lost = sum(report.ledger.friction for _, report in run.steps())
     d = run.discretisation
     theta = run.stepper.theta

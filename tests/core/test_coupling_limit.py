@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from support.boxes import along, field, right, scene
 
-from warmslip import Run, Scene
+from warmslip import Scene
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 pytestmark = pytest.mark.parametrize("d", [2, 3])
 
@@ -43,9 +45,9 @@ def column(d: int, r: float, k: float, steps: int, **keys: Any) -> Scene:
     )
 
 
-def said(job: Run) -> str:
+def said(job: Simulation) -> str:
     """What the summary says of growth, nothing where it says nothing."""
-    return " ".join(one for one in job.summary()["warnings"] if one.startswith(FED))
+    return " ".join(one for one in summary(job)["warnings"] if one.startswith(FED))
 
 
 @pytest.mark.parametrize(
@@ -139,7 +141,7 @@ def test_what_is_driven_does_not_grow(d: int, coupling: str, r: float, k: float,
         return along(d, formula) if name in ("body", "top") else formula
 
     inertia = {"inertia": {"density": 1.0}} if keys else {}
-    job = Run(column(d, r, k, 300, coupling=coupling, theta=SMALL, **inertia, **filled(keys)))
+    job = Simulation(column(d, r, k, 300, coupling=coupling, theta=SMALL, **inertia, **filled(keys)))
     for _ in job.steps():
         pass
     assert said(job) == ""
@@ -149,7 +151,7 @@ def test_what_is_driven_does_not_grow(d: int, coupling: str, r: float, k: float,
     ("r", "k", "coupling"), [(-M, 10 * LIMIT, "staggered"), (M, 1.0, "lagged"), (M, 0.05, "monolithic")]
 )
 def test_growth_until_numbers_overflow_is_the_reason(d: int, r: float, k: float, coupling: str) -> None:
-    job = Run(column(d, r, k, 3000, coupling=coupling))
+    job = Simulation(column(d, r, k, 3000, coupling=coupling))
     for _ in job.steps():
         pass
     assert job.outcome == "not_finite" and job.failure is not None

@@ -11,14 +11,15 @@ import numpy as np
 from support.boxes import along, elasticity, field, scene
 from support.ranked import Checks
 
-from warmslip import Run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 check = Checks()
 
 
-def carried(d: int, speed: float, **keys: Any) -> Run:
+def carried(d: int, speed: float, **keys: Any) -> Simulation:
     """A warm body under a load, on a support that moves with it: nothing but its place depends on the speed."""
-    job = Run(
+    job = Simulation(
         scene(
             d,
             3 if d == 2 else 2,
@@ -49,7 +50,7 @@ def rounding_of_a_fast_motion(d: int) -> None:
         still = field(carried(d, 0.0, coupling=coupling), "theta")
         for speed in (1e4, 1e6, 1e8, 1e10, 1e12):
             job = carried(d, speed, coupling=coupling)
-            stated, said = job.summary()["digits"], job.summary()["warnings"]
+            stated, said = summary(job)["digits"], summary(job)["warnings"]
             error = np.abs(field(job, "theta") - still).max() / np.abs(still).max()
             assert error <= 10 ** (1 - stated["theta"]), (coupling, speed, error, stated)
             assert stated["theta"] <= 1 - np.log10(speed * 1e-16 / np.abs(still).max())
@@ -61,8 +62,8 @@ def rounding_of_a_fast_motion(d: int) -> None:
 def rounding_of_a_motion_that_is_over(d: int) -> None:
     """A support leaps away and comes back in between: the temperature has kept what rounding made of the way."""
 
-    def leaps(way: float, coupling: str) -> Run:
-        job = Run(
+    def leaps(way: float, coupling: str) -> Simulation:
+        job = Simulation(
             scene(
                 d,
                 3 if d == 2 else 2,
@@ -88,16 +89,16 @@ def rounding_of_a_motion_that_is_over(d: int) -> None:
         for way in (1e6, 1e9, 1e12):
             job = leaps(way, coupling)
             error = np.abs(field(job, "theta") - still).max() / np.abs(still).max()
-            assert error <= 10 ** (1 - job.summary()["digits"]["theta"]), (coupling, way, error)
+            assert error <= 10 ** (1 - summary(job)["digits"]["theta"]), (coupling, way, error)
 
 
 @check
 def friction_heat_of_a_light_touch(d: int) -> None:
     """The temperature comes from a contact force of few digits, and has no more."""
 
-    def pulled(load: float) -> Run:
+    def pulled(load: float) -> Simulation:
         sides = {"right": along(d, 0.0, load), "left": along(d, 0.0, -load)}
-        job = Run(
+        job = Simulation(
             scene(
                 d,
                 3 if d == 2 else 2,
@@ -129,14 +130,14 @@ def friction_heat_of_a_light_touch(d: int) -> None:
     assert one.outcome == other.outcome == "right", (one.failure, other.failure)
     size = np.abs(field(one, "theta")).max()
     change = np.abs(field(one, "theta") - field(other, "theta")).max() / size
-    stated = one.summary()["digits"]
+    stated = summary(one)["digits"]
     assert 0 < change <= 10 ** (1 - stated["theta"]), (change, stated)
     assert abs(stated["theta"] - stated["contact_force"]) < 1
 
 
-def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: Any) -> Run:
+def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: Any) -> Simulation:
     """A steel block rests by its weight on a foundation that cools it, without inertia: it shrinks over all points."""
-    job = Run(
+    job = Simulation(
         scene(
             d,
             1 if d == 2 else 2,
@@ -162,8 +163,8 @@ def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: A
     return job
 
 
-def unplaced(job: Run) -> bool:
-    return any("do not determine where the body is" in words for words in job.summary()["warnings"])
+def unplaced(job: Simulation) -> bool:
+    return any("do not determine where the body is" in words for words in summary(job)["warnings"])
 
 
 @check
@@ -171,7 +172,7 @@ def a_place_that_no_force_determines(d: int) -> None:
     """Two points that slip towards each other hold a body wherever it lies between; many in the plane know where."""
     for coupling in ("staggered", "monolithic"):
         job = cooling(d, coupling)
-        digits = job.summary()["digits"]
+        digits = summary(job)["digits"]
         assert unplaced(job) == (d == 2)
         assert digits["u"] == 0 if d == 2 else digits["u"] > 8
     if d == 3:
@@ -179,10 +180,10 @@ def a_place_that_no_force_determines(d: int) -> None:
     # where it is undetermined in steps alone whose digits nobody estimates
     push = "where(t<150,2e4,where(t>550,2e4,where(abs(t-300)<50,2e4,0)))"
     job = cooling(d, "staggered", steps=6, push=push)
-    assert unplaced(job) and job.summary()["digits"]["u"] == 0
-    assert job.summary()["digits"]["theta"] > 8
+    assert unplaced(job) and summary(job)["digits"]["u"] == 0
+    assert summary(job)["digits"]["theta"] > 8
     job = cooling(d, "staggered", friction_heating={"share": 1.0})
-    assert unplaced(job) and job.summary()["digits"]["theta"] == 0
+    assert unplaced(job) and summary(job)["digits"]["theta"] == 0
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

@@ -14,7 +14,7 @@ from reference.exact_cases import CASES, COUPLINGS, CYCLES, SEVERAL, SOLID, Case
 from reference.exact_numbers import floats, zeros
 from reference.exact_scheme import DIGITS, OPEN, SLIP, STICK, Scheme, State
 
-from warmslip import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.verification.check import Line, below
 
 ROUND_OFF = 1e-12  # relative to the largest entry of each field
@@ -26,7 +26,7 @@ def relative(observed: Any, expected: Any) -> float:
     return float(np.abs(observed - expected).max() / (np.abs(expected).max() or 1.0))
 
 
-def order(job: Run, scheme: Scheme) -> list[int]:
+def order(job: Simulation, scheme: Scheme) -> list[int]:
     """The core's number of each contact point of the scheme."""
     surface = job.discretisation.surface
     ours = np.hstack([surface.positions, surface.normals])
@@ -34,7 +34,7 @@ def order(job: Run, scheme: Scheme) -> list[int]:
     return [int(np.abs(ours - x).sum(axis=1).argmin()) for x in theirs]
 
 
-def lines(case: str, scheme: Scheme, job: Run, state: State) -> list[Line]:
+def lines(case: str, scheme: Scheme, job: Simulation, state: State) -> list[Line]:
     """The core's state against the exact one. Forces by node: Gauss points in stick may share one in many ways."""
     at, d = order(job, scheme), job.discretisation
     force = np.asarray(job.stepper.contact_force).reshape(-1, scheme.d)[at]

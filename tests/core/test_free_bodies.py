@@ -12,7 +12,9 @@ import pytest
 from support.boxes import along, elasticity, field, right, scene
 from support.ranked import Checks
 
-from warmslip import Run, Scene
+from warmslip import Scene
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 check = Checks()
 EXPANSION = 2.0
@@ -53,7 +55,7 @@ def steel(d: int, n: int, end: float, **tables: Any) -> Scene:
     )
 
 
-def momentum(job: Run) -> Any:
+def momentum(job: Simulation) -> Any:
     return job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
 
 
@@ -160,7 +162,7 @@ def flight_makes_no_heat(d: int) -> None:
                         initial={"velocity": velocity},
                     )
                     job = right(one, digits=4.0)
-                    told = job.summary()
+                    told = summary(job)
                     assert told["digits"]["u"] >= 8
                     said = any("the temperature keeps" in words for words in told["warnings"])
                     assert said == (told["digits"]["theta"] < 4)
@@ -203,15 +205,15 @@ def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend:
             },
         )
 
-    operators = Run(coupled(unit)).discretisation.operators
+    operators = Simulation(coupled(unit)).discretisation.operators
     heat = dense(operators.mass) / k + dense(operators.conductivity)
     motion = dense(operators.inertia) / k + k * dense(operators.elasticity)
     expansion = dense(operators.expansion) / unit
     fed = np.linalg.solve(motion, expansion @ np.linalg.solve(heat, expansion.T))
     limit = 1 / np.sqrt(np.abs(np.linalg.eigvals(fed)).max())
-    Run(coupled(limit * (1 - 1e-6)), backend=backend)
+    Simulation(coupled(limit * (1 - 1e-6)), backend=backend)
     with pytest.raises(ValueError, match="indefinite"):
-        Run(coupled(limit * (1 + 1e-6)), backend=backend)
+        Simulation(coupled(limit * (1 + 1e-6)), backend=backend)
 
 
 @pytest.mark.parametrize("backend", ["automatic", "petsc"])
@@ -234,9 +236,9 @@ def test_an_indefinite_coupling_of_a_held_body_is_refused(d: int, backend: str) 
             },
         )
 
-    Run(coupled(0.1), backend=backend)
+    Simulation(coupled(0.1), backend=backend)
     with pytest.raises(ValueError, match="indefinite"):
-        Run(coupled(10.0), backend=backend)
+        Simulation(coupled(10.0), backend=backend)
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

@@ -63,7 +63,7 @@ def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> N
     assert other.outcome == "right"
     for name in ("u", "w", "theta"):
         assert np.abs(getattr(own, name) - getattr(other, name)).max() <= 1e-9 * np.abs(getattr(own, name)).max()
-    run = warmslip.Run(scene)
+    run = warmslip.Simulation(scene)
     ledgers = []
     parts, x = run.discretisation.mesh.parts, np.asarray(run.discretisation.mesh.nodes)
     top, left = (np.unique(parts[part]) for part in ("top", "left"))
@@ -122,7 +122,7 @@ def test_a_body_carried_by_its_supports_is_affine(coupling: str) -> None:
         },
         initial={"velocity": ["0.1 + 0.2 * x - 0.3 * y", "0.4 * x + 0.1 * y"], "temperature": "1 + 2 * x - y"},
     )
-    run = warmslip.Run(scene)
+    run = warmslip.Simulation(scene)
     for _, report in run.steps():
         assert report.ledger.support_work != 0
     assert run.outcome == "right"

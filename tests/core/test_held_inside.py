@@ -13,8 +13,9 @@ from support.boxes import FAR, SIDES, along, axis_of, elasticity, field, right, 
 from support.ranked import Checks
 
 import warmslip
-from warmslip import Run, _core, discretise
+from warmslip import _core, discretise
 from warmslip.model.materials import make_mesh
+from warmslip.simulation.simulation import Simulation
 
 check = Checks()
 
@@ -48,7 +49,7 @@ def a_corner_inside_is_refused_on_every_part(d: int) -> None:
         for by in beside(d, part):
             one = held(d, part, by, 0.02, gap=0.005)
             with pytest.raises(ValueError, match=rf"holds '{part}' 0\.015 inside its rigid .*at t = 0.*contact.gap"):
-                Run(one)
+                Simulation(one)
 
 
 @check
@@ -59,7 +60,7 @@ def its_cures_are_cures(d: int) -> None:
     soft = {
         "bottom": warmslip.Law(compliance=lambda r: (100.0 * max(r, 0.0), 100.0 * (r > 0), 50.0 * max(r, 0.0) ** 2))
     }
-    Run(held(d, "bottom", "left", 0.02, gap=0.005), laws=soft)  # the user's law takes the place of the rigid one
+    Simulation(held(d, "bottom", "left", 0.02, gap=0.005), laws=soft)  # the user's law takes the place of the rigid one
 
 
 @check
@@ -67,7 +68,7 @@ def the_deepest_place_is_named(d: int) -> None:
     one = held(d, "bottom", "left" if d == 2 else "front", 0.02, gap="0.018 - 0.015 * x")
     x = 0.0 if d == 2 else 1.0  # the front's edge has its deepest end at x = 1
     with pytest.raises(ValueError, match=f"'bottom' {0.02 - (0.018 - 0.015 * x):.3g} inside .* at [(]{x:.4g}, 0"):
-        Run(one)
+        Simulation(one)
 
 
 @check
@@ -79,13 +80,13 @@ def a_run_ends_at_the_step_that_brings_it_inside(d: int) -> None:
         ("t / 50", "0.024 - t / 60", 0.0035),
     ):
         one = held(d, "bottom", "left", inside, gap=gap)
-        job = Run(one)
+        job = Simulation(one)
         taken = len(list(job.steps()))
         assert job.outcome == "held_inside" and job.failure is not None
         assert job.failure["step"] == taken + 1
         assert f"holds 'bottom' {depth:.3g} inside" in job.failure["reason"]
         assert taken == 2
-        kept, before = field(job, "u"), Run(one.override(**{"time.end": 0.5, "time.steps": 2}))
+        kept, before = field(job, "u"), Simulation(one.override(**{"time.end": 0.5, "time.steps": 2}))
         assert len(list(before.steps())) == 2 and before.outcome == "right"
         assert np.abs(kept - field(before, "u")).max() <= 1e-14
     right(held(d, "bottom", "left", "t / 50", gap=0.02))

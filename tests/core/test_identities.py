@@ -15,7 +15,7 @@ from reference import scipy_scheme
 import warmslip
 from warmslip import Loads, Scene, Trajectory
 
-IDENTITIES = ("energy", "heat", "force", "law")
+BALANCES = ("energy", "heat", "force", "law")
 COUPLINGS = scipy_scheme.COUPLINGS
 CASES = list(itertools.product(scipy_scheme.READINGS, COUPLINGS, ("nodal", "gauss-2")))
 DISSIPATIONS = (
@@ -37,7 +37,7 @@ def scene(reading: str = "mixed", **keys: Any) -> Scene:
 def check(one: Scene, **how: Any) -> warmslip.Result:
     result = warmslip.run(one, **how)
     assert result.outcome == "right"
-    worst = {name: result.summary["identities"][name] for name in IDENTITIES}
+    worst = {name: result.summary["identities"][name] for name in BALANCES}
     assert worst["law"] <= 1e-11, worst
     assert max(v for k, v in worst.items() if k != "law") <= 1e-11, worst
     return result
@@ -77,7 +77,7 @@ def test_balances(tmp_path: Path, reading: str, coupling: str, quadrature: str) 
 
 def test_opposite_coupling_cancels() -> None:
     """R = -M, monolithic: what expansion takes from the motion, heating gives to the heat, term by term."""
-    job = warmslip.Run(scene("consistent", time__coupling="monolithic"))
+    job = warmslip.Simulation(scene("consistent", time__coupling="monolithic"))
     for _, report in job.steps():
         assert report.ledger.heating == pytest.approx(-report.ledger.expansion_work, rel=1e-11)
 

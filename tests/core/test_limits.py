@@ -16,8 +16,9 @@ from scipy.linalg import expm
 from support.boxes import along, elasticity, field, fields, misses, right, scene
 
 import warmslip
-from warmslip import Run, Scene
+from warmslip import Scene
 from warmslip.model.foresight import before, gradients
+from warmslip.simulation.simulation import Simulation
 
 pytestmark = pytest.mark.parametrize("d", [2, 3])
 ROUND_OFF = 1e-12
@@ -89,7 +90,7 @@ def test_friction_to_full_stick(d: int) -> None:
     clamped = squeezed(d)
     plates = {"bottom": [0.0] * d, **clamped.supports.moved}
     exact = fields(right(clamped.override(**{"supports.displacement": plates})))
-    job, ratios = Run(stuck(d, 1e3)), []
+    job, ratios = Simulation(stuck(d, 1e3)), []
     for _, report in job.steps():
         assert report.stick == len(job.discretisation.surface.weights)
         force = fields(job)["contact force"]
@@ -211,7 +212,7 @@ def linear(d: int, **time: Any) -> Scene:
 
 def semi_discrete(d: int, end: float) -> dict[str, Any]:
     """u, w and theta of `linear`, exact in time: the exponential of the assembled operators and of the foundation's springs."""
-    built = Run(linear(d, end=end, steps=1)).discretisation
+    built = Simulation(linear(d, end=end, steps=1)).discretisation
     o, stepper = built.operators, built.stepper()
     start = {name: getattr(stepper, name).array.copy() for name in ("u", "w", "theta")}
     rows = {name: order_of(built, getattr(stepper, name)) for name in ("u", "theta")}
@@ -270,7 +271,7 @@ def test_step_to_none(d: int) -> None:
 
 def test_one_short_step(d: int) -> None:
     """One step from the initial data changes them in proportion to k."""
-    job = Run(linear(d, end=1.0, steps=1))
+    job = Simulation(linear(d, end=1.0, steps=1))
     start = {name: field(job, name) for name in ("w", "theta")}
     falls(start, lambda k: linear(d, end=k, steps=1), order=1, first=1e-4)
 

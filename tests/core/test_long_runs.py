@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from support.boxes import along, elasticity, field, fields, misses, right, scene
 
-from warmslip import Run, Scene, _core
+from warmslip import Scene, _core
 from warmslip.model.foresight import gradients
 from warmslip.model.materials import make_mesh
+from warmslip.simulation.simulation import Simulation
 
 pytestmark = pytest.mark.parametrize("d", [2, 3])
 long = pytest.mark.parametrize("steps", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
@@ -27,7 +28,7 @@ class Forces:
         self.normal: list[float] = []
         self.tangential: list[Any] = []
 
-    def __call__(self, job: Run, report: Any) -> None:
+    def __call__(self, job: Simulation, report: Any) -> None:
         self.normal.append(report.normal_force)
         self.tangential.append(np.array(report.friction_traction))
 
@@ -41,7 +42,7 @@ def test_a_pressed_body_stays_where_it_rests(d: int, steps: int) -> None:
     first: dict[str, Any] = {}
     forces, worst = Forces(), [0.0]
 
-    def each(job: Run, report: Any) -> None:
+    def each(job: Simulation, report: Any) -> None:
         forces(job, report)
         if len(forces.normal) == 200:
             first.update(u=field(job, "u"))
@@ -73,7 +74,7 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
     velocity = np.array(along(d, -2.0, 3.0))
     lost = [0.0]
 
-    def each(job: Run, report: Any) -> None:
+    def each(job: Simulation, report: Any) -> None:
         if round(job.stepper.time / job.scene.step) % 100 == 0:
             momentum = job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
             lost.append(float(np.abs(momentum - 5.0 * velocity).max()))
@@ -141,7 +142,7 @@ def test_a_load_that_turns_every_step(d: int) -> None:
     assert pressed.report.normal_force > 0.1 and lifted.report.normal_force == 0.0
     turn = []
 
-    def each(job: Run, report: Any) -> None:
+    def each(job: Simulation, report: Any) -> None:
         still = lifted if round(job.stepper.time) % 2 == 0 else pressed
         turn.append(misses({"u": field(job, "u")}, {"u": field(still, "u")})["u"])
         assert report.normal_force == pytest.approx(still.report.normal_force, rel=ROUND_OFF)
@@ -161,7 +162,7 @@ def test_impact_and_release_every_few_steps(d: int, stiffness: Any) -> None:
     for young in (1e4, 1e5):
         forces, heights = Forces(), []
 
-        def each(job: Run, report: Any, forces: Forces = forces, heights: list[float] = heights) -> None:
+        def each(job: Simulation, report: Any, forces: Forces = forces, heights: list[float] = heights) -> None:
             forces(job, report)
             heights.append(float(field(job, "u")[:, -1].mean()))
 
@@ -208,7 +209,7 @@ def test_stick_slip_stick_follows_its_hysteresis(d: int) -> None:
     ).override(**{"mesh.lengths": [4.0] * (d - 1) + [1.0]})
     forces, slips = Forces(), []
 
-    def each(job: Run, report: Any) -> None:
+    def each(job: Simulation, report: Any) -> None:
         forces(job, report)
         slips.append(report.stick == 0 and report.slip > 0)
 

@@ -12,13 +12,13 @@ import pytest
 from support.boxes import along, elasticity, field, forces_of, right, scene
 from support.ranked import Checks
 
-from warmslip import Run
+from warmslip.simulation.simulation import Simulation
 
 check = Checks()
 STEEL: dict[str, Any] = {"young": 2.1e11, "poisson": 0.3}
 
 
-def bottom(job: Run) -> Any:
+def bottom(job: Simulation) -> Any:
     """Which nodes lie at the bottom, (nodes)."""
     return np.asarray(job.discretisation.mesh.nodes)[:, -1] == 0
 
@@ -206,7 +206,7 @@ def regularised_friction_of_any_sharpness(d: int) -> None:
                 contact={"part": "bottom", "stiffness": 1e4, "friction": friction},
             )
         )
-        assert set(job.stages) == {"newton"} and job.newton_max <= 6
+        assert set(job.statistics.stages) == {"newton"} and job.statistics.newton_max <= 6
         answers[sharpness] = forces_of(job)
     exact = answers.pop(0.0)
     miss = {e: np.abs(found - exact).max() / np.abs(exact).max() for e, found in answers.items()}
@@ -247,7 +247,7 @@ def shares_beside_a_clamped_edge(d: int) -> None:
         loads={"body": along(d, -0.02), "traction": {"right": along(d, -0.01, 0.02)}},
         contact={"part": "bottom", "stiffness": 90.0, "quadrature": "gauss-3", "friction": {"cohesion": 0.005}},
     ).override(**{"mesh.lengths": [1.0] * (d - 1) + [0.1]})
-    other = Run(one, backend="petsc")
+    other = Simulation(one, backend="petsc")
     for _ in other.steps():
         pass
     found, again = forces_of(right(one)), forces_of(other)
@@ -295,7 +295,7 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
             supports={"displacement": {"top": along(d, "-0.001 * t", "0.0008 * t")}},
             contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-3"} | friction,
         )
-        job, other = right(one), Run(one, backend="petsc")
+        job, other = right(one), Simulation(one, backend="petsc")
         for _ in other.steps():
             pass
         found, again = forces_of(job), forces_of(other)

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from support.statuses import Step, random_step, velocities
 
-from warmslip import Run, Scene
+from warmslip import Scene
 from warmslip.model import several_solutions
 from warmslip.model.linear_pieces import exact, solutions
 from warmslip.model.uniqueness import ContactPoints, bound, shares_friction
 from warmslip.scene.reader import build
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 
 def part(name: str, quadrature: str = "nodal", stiffness: Any = 1e3, mu: float = 0.5) -> dict[str, Any]:
@@ -50,7 +52,7 @@ ROUGH = {  # a normal force with friction is shared
 
 
 def known(scene: Scene) -> tuple[ContactPoints, several_solutions.Finding]:
-    job = Run(scene)
+    job = Simulation(scene)
     return several_solutions.condensed(job.discretisation, job.stepper).rubbing, several_solutions.of_scene(
         job.discretisation, job.stepper
     )
@@ -177,11 +179,11 @@ def test_a_run_that_has_another_solution_says_so(name: str) -> None:
             "supports.displacement": {"top": [f"{one} * t" for one in moved]},
         }
     )
-    job = Run(scene)
+    job = Simulation(scene)
     assert list(job.steps()) and job.outcome == "right"
     points, free, penetration = several_solutions.posed(job.discretisation, job.stepper)
     moves = np.diag(points.compliance).reshape(-1, 2).sum(axis=1) > 0
     found = velocities(points.of(moves), Step(free[moves], penetration[moves], free[moves]))
     assert len(found) > 1
-    (told,) = [one for one in job.summary()["warnings"] if "several" in one]
+    (told,) = [one for one in summary(job)["warnings"] if "several" in one]
     assert words in told

@@ -10,13 +10,13 @@ import pytest
 from scipy.optimize import fsolve
 from support.boxes import along, elasticity, forces_of, right, scene
 
-from warmslip import Run
+from warmslip.simulation.simulation import Simulation
 
 
 class Posed:
     """What the law reads in the last step of a run: compliance, free velocities, penetrations, normals, weights, forces."""
 
-    def __init__(self, job: Run) -> None:
+    def __init__(self, job: Simulation) -> None:
         surface, stepper = job.discretisation.surface, job.stepper
         self.k = job.discretisation.scene.step
         self.C, self.free = np.array(stepper.contact_compliance), np.array(stepper.contact_free)
@@ -181,7 +181,7 @@ def test_sharp_regularisation_at_gauss_points() -> None:
             },
         )
     )
-    assert set(job.stages) == {"newton"}
+    assert set(job.statistics.stages) == {"newton"}
     posed = Posed(job)
     pressing, friction = posed.split(posed.force)
     w = posed.split(posed.velocity(posed.force))[1][:, 0]

@@ -35,7 +35,7 @@ class Trapped:
 
 for line in sys.argv[1:]:
     name, *overrides = line.split()
-    job = warmslip.Run(warmslip.load(name, overrides))
+    job = warmslip.Simulation(warmslip.load(name, overrides))
     job.stepper = Trapped(job.stepper)
     taken = sum(1 for _ in job.steps())
     print(f"{name}: {job.outcome} {taken}", flush=True)

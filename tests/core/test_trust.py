@@ -13,7 +13,8 @@ from support.boxes import along, elasticity, field, right, scene
 from support.ranked import Checks
 
 import warmslip
-from warmslip import Run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 STEEL: dict[str, Any] = {"young": 2e11, "poisson": 0.3}
 check = Checks()
@@ -156,7 +157,7 @@ def unloading(d: int) -> None:
         supports={"displacement": ["bottom"]},
         loads={"traction": {"top": along(d, "-sin(2*pi*t)")}},
     )
-    job, found = Run(one), []
+    job, found = Simulation(one), []
     for state, _ in job.steps():
         found.append(state.u)
     assert job.outcome == "right"
@@ -209,7 +210,7 @@ def touches_with_zero_force(d: int) -> None:
             initial={"velocity": along(d, -2.0)},
             contact={"part": "bottom", "gap": gap, "stiffness": 100.0},
         )
-        job, forces = Run(one), []
+        job, forces = Simulation(one), []
         for state, report in job.steps():
             if -state.u[0, -1] <= gap * (1 + 1e-14):
                 forces.append(report.normal_force)
@@ -251,7 +252,7 @@ def quasistatic_on_contact(d: int) -> None:
     assert job.report.normal_force == pytest.approx(1.0, rel=1e-12)
     assert np.linalg.norm(job.report.friction_traction) == pytest.approx(0.1, rel=1e-12)
     for body in (along(d, 1.0), along(d, -1.0, 0.6)):
-        lifted = Run(one.override(loads={"body": body}))
+        lifted = Simulation(one.override(loads={"body": body}))
         assert not list(lifted.steps()) and lifted.outcome == "unsupported", lifted.outcome
 
 
@@ -302,11 +303,11 @@ def slender(d: int) -> None:
         contact={"part": "bottom", "stiffness": 1e9, "gap": 1.0},
     ).override(**{"mesh.lengths": [0.02] * (d - 1) + [1.0]})
     job = right(one, digits=6.0)
-    other = Run(one, backend="petsc")
+    other = Simulation(one, backend="petsc")
     for _ in other.steps():
         pass
     u, v = field(job, "u"), field(other, "u")
-    assert np.abs(u - v).max() <= 10 ** (1 - job.summary()["digits"]["u"]) * np.abs(u).max()
+    assert np.abs(u - v).max() <= 10 ** (1 - summary(job)["digits"]["u"]) * np.abs(u).max()
 
 
 @check
@@ -318,7 +319,7 @@ def stiff_and_rigid(d: int) -> None:
     force = {}
     for stiffness in (1e5, 1e6, 1e7, 1e12, 1e16, "rigid"):
         job = right(base.override(**{"contact.stiffness": stiffness}))
-        assert set(job.stages) <= {"none", "newton"}, job.stages
+        assert set(job.statistics.stages) <= {"none", "newton"}, job.statistics.stages
         force[stiffness] = np.asarray(job.stepper.contact_force)
     size, rigid = np.abs(force["rigid"]).max(), force["rigid"]
     miss = {c: np.abs(f - rigid).max() / size for c, f in force.items()}

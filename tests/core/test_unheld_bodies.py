@@ -13,8 +13,9 @@ import pytest
 from support.boxes import FAR, SIDES, along, axis_of, elasticity, fields, right, scene, turned
 from support.ranked import Checks
 
-from warmslip import Run, discretise
+from warmslip import discretise
 from warmslip.scene.reader import build
+from warmslip.simulation.simulation import Simulation
 
 check = Checks()
 
@@ -41,7 +42,7 @@ def free(d: int, part: str, load: Any, mu: float = 0.5, n: int = 2, **contact: A
 
 
 def outcome(one: Any, mesh: Any = None) -> str:
-    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    job = Simulation(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
     assert not list(job.steps()) or job.outcome == "right"
     return job.outcome
 
@@ -107,7 +108,7 @@ def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
 @check
 def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
     one = free(d, "bottom", [0.0] * (d - 1) + ["4 * t - 2.6"], gap=0.01).override(**{"time.steps": 4})
-    job = Run(one)
+    job = Simulation(one)
     assert (len(list(job.steps())), job.outcome) == (2, "unsupported")
     assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
 
@@ -120,7 +121,7 @@ def a_push_that_friction_resists(d: int) -> None:
         for stiffness in (1e10, "rigid"):
             for push in (0.0, 1e-6, 1e-3, 1.0, 5e3):
                 for sign in (1, -1):
-                    job = Run(
+                    job = Simulation(
                         scene(
                             d,
                             n,
@@ -235,7 +236,7 @@ def what_held_it_lets_it_fly(d: int) -> None:
     """A constant friction bound acts without pressure: it calms a falling body until nothing but its fall is left."""
     n, steps, end = (24, 24, 0.00424) if d == 2 else (4, 24, 0.02)
     for density, young in ((917.0, 9e9), (600.0, 1e10)):
-        job = Run(
+        job = Simulation(
             scene(
                 d,
                 n,

@@ -9,13 +9,12 @@ import atheris
 
 # only what is ours or reads for us: every branch that counts costs time
 with atheris.instrument_imports(include=["warmslip", "tomllib"]):
-    from readers import READERS, checkpoint, owner
+    from readers import READERS
 
 
 def main() -> None:
     # libFuzzer passes over what begins with two dashes and hands it on to the processes of a merge, which start this file
     reader = READERS[next(word for word in sys.argv if word.startswith("--reader=")).removeprefix("--reader=")]
-    checkpoint._owner = owner
 
     def one(data: bytes) -> None:
         reader(data)

@@ -13,6 +13,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from warmslip.mesh import files
 from warmslip.scene.expressions import Expression
 from warmslip.scene.reader import build
 from warmslip.simulation import checkpoint
-from warmslip.simulation.run import Run
+from warmslip.simulation.checkpoint import Checkpoint
+from warmslip.simulation.simulation import Simulation
 
 CORPUS = Path(__file__).parent / "corpus"
 FOLDER = Path(tempfile.mkdtemp(prefix="warmslip-fuzz-"))
@@ -53,7 +55,7 @@ def _stepped(scene: warmslip.Scene) -> None:
     cells = len(files.read(table.file).cells) if table.file else 6 * np.prod(table.counts, dtype=float)
     if cells <= CELLS:
         with contextlib.suppress(ValueError):
-            next(Run(scene).steps(), None)
+            next(Simulation(scene).steps(), None)
 
 
 def scene(data: bytes) -> bool:
@@ -123,15 +125,11 @@ def _arrays(data: bytes) -> dict[str, Any]:
     return {}
 
 
-def owner(_: Run) -> dict[str, Any]:
-    """In the place of `checkpoint._owner`: the true one changes with every source."""
-    return {"scene": "small"}
-
-
 @cache
-def _job() -> Run:
-    """The run that checkpoints are read into."""
-    return Run(warmslip.load("paper_mixed").override(**{"mesh.n": 2, "time.steps": 4}))
+def _simulation() -> tuple[Simulation, Checkpoint]:
+    """What checkpoints are read into, and its first one; the true owner changes with every source."""
+    simulation = Simulation(warmslip.load("paper_mixed").override(**{"mesh.n": 2, "time.steps": 4}))
+    return simulation, replace(simulation.take_checkpoint(), owner={"scene": "small"})
 
 
 def checkpoints(data: bytes) -> bool:
@@ -141,13 +139,15 @@ def checkpoints(data: bytes) -> bool:
         with contextlib.suppress(ValueError):  # names and types that NumPy does not store
             np.savez(file, **arrays)
         data = file.getvalue()
-    job, path = _job(), _written(checkpoint.NAMES[0], data)
+    (simulation, start), path = _simulation(), _written(checkpoint.NAMES[0], data)
     try:
-        if not checkpoint.load(path.parent, job):
-            return False
+        found = checkpoint.read(path.parent, start, simulation.scene.time.steps)
     except ValueError as error:
         return _refused(error)
-    job.stepper.advance(*job.discretisation.load_vectors.at(1.0))
+    if found is None:
+        return False
+    simulation.restore(found)
+    simulation.stepper.advance(*simulation.discretisation.load_vectors.at(1.0))
     return True
 
 

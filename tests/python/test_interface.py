@@ -25,7 +25,7 @@ def function(x: Any, t: Any = 0.0) -> Any:
 
 def test_about_a_dozen_names_all_keyword_only_but_the_first() -> None:
     assert len(warmslip.__all__) == 12
-    for name in ("run", "discretise", "Run"):
+    for name in ("run", "discretise", "Simulation"):
         _, *more = [p for p in inspect.signature(getattr(warmslip, name)).parameters.values() if p.name != "self"]
         assert all(p.kind is p.KEYWORD_ONLY for p in more), name
     with pytest.raises(TypeError):
@@ -33,7 +33,7 @@ def test_about_a_dozen_names_all_keyword_only_but_the_first() -> None:
 
 
 def test_states_are_read_in_the_loop(small: Small) -> None:
-    job = warmslip.Run(small())
+    job = warmslip.Simulation(small())
     states = []
     for state, report in job.steps():
         assert state.u.shape == state.w.shape == (25, 2) and state.theta.shape == (25,)
@@ -43,7 +43,7 @@ def test_states_are_read_in_the_loop(small: Small) -> None:
         states.append(state)
     assert [state.step for state in states] == [1, 2, 3, 4]
     assert np.abs(states[0].u - states[3].u).max() > 1e-6  # kept, as it was read
-    late = warmslip.Run(small())
+    late = warmslip.Simulation(small())
     first, *_ = [state for state, _ in late.steps()]
     with pytest.raises(RuntimeError, match="not read before the next step"):
         _ = first.u
@@ -59,7 +59,7 @@ def test_observers_see_every_step(small: Small) -> None:
 
 
 def test_operators_and_factors_are_petsc_objects(small: Small) -> None:
-    job = warmslip.Run(small())
+    job = warmslip.Simulation(small())
     right = job.discretisation.operators.elasticity.createVecRight()
     out = right.duplicate()
     right.set(1.0)

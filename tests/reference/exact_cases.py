@@ -12,7 +12,8 @@ import warmslip
 from reference.exact_forms import Mesh, box
 from reference.exact_numbers import exact, floats
 from reference.exact_scheme import Scheme, State
-from warmslip import Run, Scene, _core, discretise
+from warmslip import Scene, _core, discretise
+from warmslip.simulation.simulation import Simulation
 
 COUPLINGS = "staggered", "lagged", "monolithic"
 
@@ -109,14 +110,16 @@ class Case:
         """The exact states, the initial one first."""
         return [self.scheme.start(), *self.scheme.march()]
 
-    def run(self, **more: Any) -> Run:
+    def run(self, **more: Any) -> Simulation:
         """The core on this case, not yet stepped."""
         scene, mesh = self.scene(**more), self.exact_mesh()
         if isinstance(self.mesh, int):
-            return Run(scene)
+            return Simulation(scene)
         kind = _core.Mesh2 if mesh.dim == 2 else _core.Mesh3
         parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
-        return Run(scene, discretisation=discretise(scene, mesh=kind.from_lists(floats(mesh.nodes), mesh.cells, parts)))
+        return Simulation(
+            scene, discretisation=discretise(scene, mesh=kind.from_lists(floats(mesh.nodes), mesh.cells, parts))
+        )
 
 
 CASES: dict[str, Case] = {

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from warmslip import Run, Scene, _core, discretise
+from warmslip import Scene, _core, discretise
 from warmslip.model.materials import make_mesh
 from warmslip.scene.mesh_table import PARTS
 from warmslip.scene.reader import build
 from warmslip.simulation import summary
+from warmslip.simulation.simulation import Simulation
 
 SIDES = {2: PARTS["square"], 3: PARTS["cube"]}
 FAR = ("right", "top", "back")  # at the far end of their axis
@@ -49,27 +50,29 @@ def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
     return [first, *[0.0] * (d - 2), last]
 
 
-def right(one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Run, Any], None] | None = None) -> Run:
+def right(
+    one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Simulation, Any], None] | None = None
+) -> Simulation:
     """A run that must end right, with so many digits in every field that is more than what rounding makes of the others.
 
     `each` is called with run and report of every step.
     """
-    job = Run(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    job = Simulation(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
     for _, report in job.steps():
         if each is not None:
             each(job, report)
     assert job.outcome == "right", (job.outcome, job.failure)
-    assert max(job.worst.values()) <= 1e-11, job.worst
-    stated = summary.digits(job.errors)
+    assert max(job.statistics.residuals.values()) <= 1e-11, job.statistics.residuals
+    stated = summary.digits(job.statistics.errors)
     assert min(stated.values()) >= digits, stated
     return job
 
 
-def field(job: Run, name: str) -> Any:
+def field(job: Simulation, name: str) -> Any:
     return job.discretisation.field(getattr(job.stepper, name))
 
 
-def fields(job: Run) -> dict[str, Any]:
+def fields(job: Simulation) -> dict[str, Any]:
     """What the run has of u, w and theta in mesh numbering, and its contact forces (points, d)."""
     found = {name: field(job, name) for name in ("u", "w", "theta")}
     if len(job.stepper.contact_force):
@@ -77,7 +80,7 @@ def fields(job: Run) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def forces_of(job: Run) -> Any:
+def forces_of(job: Simulation) -> Any:
     """Contact forces, (points, d)."""
     return np.reshape(job.stepper.contact_force, (-1, job.discretisation.dim))
 

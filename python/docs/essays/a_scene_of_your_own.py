@@ -61,7 +61,7 @@ assert "did you mean 'coefficient'?" in said
 # ## The loop
 
 # %%
-job = warmslip.Run(scene)
+job = warmslip.Simulation(scene)
 steps = [(state.time, report.normal_force, report.friction_traction[0], report.ledger) for state, report in job.steps()]
 time, normal, friction, ledgers = (np.array(column, dtype=object) for column in zip(*steps, strict=True))
 time, normal, friction = (column.astype(float) for column in (time, normal, friction))
@@ -107,7 +107,7 @@ assert damped < 0.05 * taken
 # would warm the foot.
 
 # %%
-finer = warmslip.Run(scene.override(**{"time.steps": 400}))
+finer = warmslip.Simulation(scene.override(**{"time.steps": 400}))
 less = sum(r.ledger.elastic_damping + r.ledger.contact_damping for s, r in finer.steps() if s.time > 1.5 + 1e-9)
 print(f"damping with half the step: {less:.5f}, {less / damped:.2f} of what it was")
 assert 0.45 < less / damped < 0.55

@@ -47,7 +47,7 @@ assert [name for name in READINGS if ratio[name]["u_V"] < 1] == ["isotropic"]
 
 # %%
 for name in ("mixed", "consistent"):
-    job = warmslip.Run(scenes[name].override(**{FOUNDATION: 10.0, "time.coupling": "monolithic"}))
+    job = warmslip.Simulation(scenes[name].override(**{FOUNDATION: 10.0, "time.coupling": "monolithic"}))
     terms = np.array([(report.ledger.expansion_work, report.ledger.heating) for _, report in job.steps()])
     together = np.abs(terms.sum(axis=1)).max() / np.abs(terms).max()
     print(f"{name:10s}  |expansion work + heating| over the larger: {together:.1e}")

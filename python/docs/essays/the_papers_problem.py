@@ -15,22 +15,22 @@ import warmslip
 
 scene = warmslip.load("paper_mixed")
 cold, hot = (
-    warmslip.Run(scene.override(**{"contact.heat_exchange.foundation_temperature": temperature}))
+    warmslip.Simulation(scene.override(**{"contact.heat_exchange.foundation_temperature": temperature}))
     for temperature in (0.0, 10.0)
 )
 last = {}
 for name, job in (("cold", cold), ("hot", hot)):
     for state, report in job.steps():
         last[name] = {"u": state.u, "theta": state.theta, "mises": state.mises, "report": report} | state.contact
-    print(f"{name}: {job.outcome}, largest residuals of the balances {max(job.worst.values()):.0e}")
+    print(f"{name}: {job.outcome}, largest residuals of the balances {max(job.statistics.residuals.values()):.0e}")
 
 # %% [markdown]
-# `Run.steps` yields after every step a state, whose arrays are read while it lasts, and a report. Both runs end `right`: energy,
+# `Simulation.steps` yields after every step a state, whose arrays are read while it lasts, and a report. Both runs end `right`: energy,
 # heat, forces and the contact law closed in every step, to round-off.
 
 # %%
 assert cold.outcome == hot.outcome == "right"
-assert max(*cold.worst.values(), *hot.worst.values()) < 1e-11
+assert max(*cold.statistics.residuals.values(), *hot.statistics.residuals.values()) < 1e-11
 
 nodes, cells = np.asarray(cold.discretisation.mesh.nodes), np.asarray(cold.discretisation.mesh.cells)
 figure, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")

@@ -55,7 +55,7 @@ assert "the third value is the integral of the first" in said
 
 # %%
 def marched(**laws):
-    job = warmslip.Run(scene, laws={"bottom": Law(**laws)} if laws else None)
+    job = warmslip.Simulation(scene, laws={"bottom": Law(**laws)} if laws else None)
     rows = [(s.time, r.normal_force, -r.friction_traction[0], r.max_penetration, r.slip) for s, r in job.steps()]
     assert job.outcome == "right"
     return job, np.array(rows).T
@@ -77,10 +77,10 @@ job, stiffening = marched(compliance=rough)
 print(
     f"normal force {told[1, -1]:.3f} and {stiffening[1, -1]:.3f}, deepest {told[3, -1]:.2e} and {stiffening[3, -1]:.2e}"
 )
-print(f"worst residual of the energy {job.worst['energy']:.0e}")
+print(f"worst residual of the energy {job.statistics.residuals['energy']:.0e}")
 assert abs(stiffening[1, -1] / told[1, -1] - 1) < 0.02
 assert 0.2 < stiffening[3, -1] / told[3, -1] < 0.3
-assert max(job.worst.values()) < 1e-11
+assert max(job.statistics.residuals.values()) < 1e-11
 
 # %% [markdown]
 # ## Friction that grows with speed
@@ -107,5 +107,5 @@ ax.legend()
 
 # %%
 iterations = {name: run.stepper.cost.newton_iterations for name, run in (("Coulomb", ordinary), ("growing", job))}
-print(iterations, job.stages)
+print(iterations, job.statistics.stages)
 assert iterations["growing"] < 3 * iterations["Coulomb"]

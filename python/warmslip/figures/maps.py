@@ -23,7 +23,7 @@ OUTCOMES = {
     "identity_violated": VERMILLION,
 }
 CLAIMS = {"yes": SKY, "no": ORANGE}
-IDENTITIES = ("energy", "heat", "force", "law")
+BALANCES = ("energy", "heat", "force", "law")
 
 
 def grid(inputs: list[Path]) -> tuple[Figure, str]:
@@ -173,7 +173,7 @@ def brief(text: str) -> str:
 
 def worst(line: dict[str, str]) -> float:
     """The largest identity residual of a run, nan when it has none."""
-    found = [float(line[name]) for name in IDENTITIES if line.get(name)]
+    found = [float(line[name]) for name in BALANCES if line.get(name)]
     return max((value for value in found if np.isfinite(value)), default=float("nan"))
 
 

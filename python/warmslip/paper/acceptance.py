@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip.simulation.run import IDENTITIES
+from warmslip.simulation.statistics import BALANCES
 from warmslip.studies import rates
 from warmslip.studies.error_norms import SUMS, TERMS
 
@@ -66,7 +66,7 @@ def manufactured(path: Path, expected: dict[str, Any]) -> list[Check]:
                 checks.append(Check(f"{name} order", order, p - BELOW, p + ABOVE))
                 checks.append(Check(f"{name} misfit", misfit, 0.0, MISFIT))
             checks.append(near(f"{name} finest", errors[-1], expected.get(f"{name} finest")))
-        worst = float(np.max([largest(lines, i) for i in IDENTITIES]))
+        worst = float(np.max([largest(lines, i) for i in BALANCES]))
         checks.append(Check(f"manufactured {group} {coupling} identities", worst, 0.0, IDENTITY))
         checks.append(
             Check(f"manufactured {group} {coupling} slips everywhere", lines[-1]["open"] + lines[-1]["stick"], 0, 0)
@@ -84,7 +84,7 @@ def study(path: Path, expected: dict[str, Any]) -> list[Check]:
     rows, case = rates.read(path), path.stem
     checks = [
         Check(f"{case} runs that did not end right", sum(r["outcome"] != "right" for r in rows), 0, 0),
-        *(Check(f"{case} {i} identity", largest(rows, i), 0.0, IDENTITY) for i in IDENTITIES),
+        *(Check(f"{case} {i} identity", largest(rows, i), 0.0, IDENTITY) for i in BALANCES),
         Check(
             f"{case} share of safeguarded steps",
             sum(r["safeguarded_steps"] for r in rows) / sum(r["steps"] for r in rows),
@@ -101,7 +101,7 @@ def study(path: Path, expected: dict[str, Any]) -> list[Check]:
 
 def closed(cell: dict[str, Any]) -> bool:
     """Whether a cell's balances close to EXTREME."""
-    return all(cell[name] <= EXTREME for name in IDENTITIES)
+    return all(cell[name] <= EXTREME for name in BALANCES)
 
 
 def same(name: str, value: Any, stored: Any) -> Check:

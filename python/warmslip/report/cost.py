@@ -19,8 +19,8 @@ from warmslip.model.materials import cell_regions
 from warmslip.scene.plan import Plan, plan
 from warmslip.scene.reader import library, load
 from warmslip.scene.scene import Scene
-from warmslip.simulation import checkpoint
-from warmslip.simulation.run import Run, finish, run
+from warmslip.simulation.run import finish, run
+from warmslip.simulation.simulation import Simulation
 
 FEW, MANY, LONG_ENOUGH = 5, 60, 0.3  # trial steps at least, and at most when they are quick; seconds
 
@@ -46,7 +46,7 @@ def _timed(action: Callable[[], None]) -> float:
     return time.perf_counter() - begin
 
 
-def trial(job: Run, folder: Path) -> Trial:
+def trial(job: Simulation, folder: Path) -> Trial:
     """Takes the first steps of a run with their output into a folder (collective)."""
     found, begin, few = Trial(), time.perf_counter(), 0.0
     with TrajectoryWriter(folder / "trajectory.h5", job.discretisation, job.stepper, job.comm) as writer:
@@ -64,13 +64,13 @@ def trial(job: Run, folder: Path) -> Trial:
         flush, more = _timed(writer.write), job.taken - 2 * FEW
         if more > FEW:
             found.storing = max(0.0, (flush - few) / (more - FEW))
-        saving = _timed(lambda: checkpoint.save(folder, job))
+        saving = _timed(lambda: job.take_checkpoint().write(folder))
         found.checkpoint = flush + saving
         found.extra += saving
     return found
 
 
-def _bent(job: Run) -> list[str]:
+def _bent(job: Simulation) -> list[str]:
     """Contact parts that are not flat at some nodes, as a sentence."""
     points = np.asarray(job.discretisation.surface.positions)
     nodal = all(contact.points == 0 for contact in job.scene.contacts)
@@ -83,12 +83,12 @@ def _bent(job: Run) -> list[str]:
     ]
 
 
-def _solutions(job: Run) -> tuple[list[str], list[str]]:
+def _solutions(job: Simulation) -> tuple[list[str], list[str]]:
     """How many solutions a step has, as a line, and as a warning where several are possible."""
     if job.stepper.u is None or not len(job.discretisation.surface.weights):
         return [], []
     line = several_solutions.line(several_solutions.of_scene(job.discretisation, job.stepper))
-    return [line] if line else [], several_solutions.sentences(job.discretisation, job.stepper, job.stages)
+    return [line] if line else [], several_solutions.sentences(job.discretisation, job.stepper, job.statistics.stages)
 
 
 def measured(scene: Scene, *, comm: Any = None) -> Plan:
@@ -98,7 +98,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     run would.
     """
     begin = time.perf_counter()
-    job = Run(scene, comm=comm)
+    job = Simulation(scene, comm=comm)
     setup = time.perf_counter() - begin
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()

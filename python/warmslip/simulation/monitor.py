@@ -1,4 +1,4 @@
-"""What a run watches beside its books, to say at its end what solves the equations and is hardly sensible.
+"""What a run watches beside its balances, to say at its end what solves the equations and is hardly sensible.
 
 A step costs a few reads of its report. Strains are looked at when the elastic energy has grown fourfold, temperatures after 1, 2,
 4, 8 ... steps, and both at the end.
@@ -7,31 +7,46 @@ A step costs a few reads of its report. Strains are looked at when the elastic e
 from __future__ import annotations
 
 import re
-import weakref
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from warmslip.model import several_solutions
 from warmslip.model.coupling import coupled
+from warmslip.model.discretisation import Discretisation
 from warmslip.model.foresight import TIMES, before, size
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
 from warmslip.scene import plausibility
+from warmslip.scene.scene import Scene
 from warmslip.simulation import growth
-
-if TYPE_CHECKING:
-    from warmslip.simulation.run import Run
+from warmslip.simulation.statistics import Statistics
 
 
-class Watch:
+def fits(seen: Any, other: dict[str, Any]) -> bool:
+    """Whether what a checkpoint holds is what a monitor remembers, as the `other` does."""
+    if not isinstance(seen, dict) or seen.keys() != other.keys():
+        return False
+    apart = ("low", "high", "phase", "shortest", "growth", "course")
+    numbers = [value for name, value in seen.items() if name not in apart]
+    numbers += [seen[name] for name in ("phase", "shortest") if seen[name] is not None]
+    beyond = {"bound", "value", "count", "time"}
+    for name, keys in (("low", beyond), ("high", beyond), ("growth", {"factor", "total", "begin", "end"})):
+        found = seen[name]
+        if not isinstance(found, dict) or (found and found.keys() != keys):
+            return False
+        numbers += found.values()
+    return all(type(value) in (int, float) for value in numbers) and growth.fits(seen["course"])
+
+
+class Monitor:
     """Of one run. `seen` is all that it remembers, plain numbers that a checkpoint keeps."""
 
-    def __init__(self, job: Run) -> None:
-        self._job, self._d = weakref.proxy(job), job.discretisation
-        self._law = any(contact.stiffness is not None for contact in job.scene.contacts)
-        self._impacts = bool(self._law and job.scene.inertia is not None and job.scene.inertia.density > 0)
+    def __init__(self, scene: Scene, discretisation: Discretisation, stepper: Any, comm: Any) -> None:
+        self._scene, self._d, self._stepper, self._comm = scene, discretisation, stepper, comm
+        self._law = any(contact.stiffness is not None for contact in scene.contacts)
+        self._impacts = bool(self._law and scene.inertia is not None and scene.inertia.density > 0)
         self.seen: dict[str, Any] = {
             "touching": 0,
             "undetermined": 0,
@@ -39,33 +54,18 @@ class Watch:
             "strain": 0.0,
             "energy": 0.0,
             "looked": 0,
-            "phase": 0 if job.scene.initial.velocity is not None else None,
+            "phase": 0 if scene.initial.velocity is not None else None,
             "shortest": None,
             "low": {},
             "high": {},
             "growth": {},
             "course": growth.start(),
         }
-        scheme = job.scene.time.coupling
-        both = coupled(self._d.problem.materials) if job.scene.moves and job.scene.heat is not None else []
+        scheme = scene.time.coupling
+        both = coupled(self._d.problem.materials) if scene.moves and scene.heat is not None else []
         self._coupled = [] if scheme == "monolithic" and all(one.cancels for one in both) else both
         self._driven = bool(self._coupled) and self._d.load_vectors.of_time
         self._given: list[float] = []  # norms of the data of the last step
-
-    def fits(self, seen: Any) -> bool:
-        """Whether what a checkpoint holds is what a watch remembers."""
-        if not isinstance(seen, dict) or seen.keys() != self.seen.keys():
-            return False
-        apart = ("low", "high", "phase", "shortest", "growth", "course")
-        numbers = [value for name, value in seen.items() if name not in apart]
-        numbers += [seen[name] for name in ("phase", "shortest") if seen[name] is not None]
-        beyond = {"bound", "value", "count", "time"}
-        for name, keys in (("low", beyond), ("high", beyond), ("growth", {"factor", "total", "begin", "end"})):
-            found = seen[name]
-            if not isinstance(found, dict) or (found and found.keys() != keys):
-                return False
-            numbers += found.values()
-        return all(type(value) in (int, float) for value in numbers) and growth.fits(seen["course"])
 
     def step(self, report: Any, n: int, data: Any) -> None:
         """After step n with its data (collective when it looks at a field)."""
@@ -84,7 +84,7 @@ class Watch:
         if n & (n - 1) == 0:
             self._temperatures()
         energy = report.ledger.elastic
-        if energy > 4 * seen["energy"] and n - seen["looked"] >= self._job.scene.time.steps / 4:
+        if energy > 4 * seen["energy"] and n - seen["looked"] >= self._scene.time.steps / 4:
             seen["energy"], seen["looked"] = energy, n
             self._strain()
 
@@ -100,7 +100,7 @@ class Watch:
             return
         found = growth.climb(self.seen["course"])
         if found and found["total"] >= self.seen["growth"].get("total", 0.0):
-            step = self._job.scene.step
+            step = self._scene.step
             self.seen["growth"] = found | {name: found[name] * step for name in ("begin", "end")}
 
     def _changes(self, data: Any) -> list[float]:
@@ -115,7 +115,7 @@ class Watch:
 
     def fed(self) -> list[str]:
         """What is to be said of a growth."""
-        scene = self._job.scene
+        scene = self._scene
         limits = [one.limit(scene.time.coupling) for one in self._coupled if one.cancels]
         itself = any(one.drives_itself(size(self._d)) for one in self._coupled if not one.cancels)
         cancels = len(limits) == len(self._coupled)
@@ -124,7 +124,7 @@ class Watch:
     def reason(self, given: str) -> str:
         """Why a step was not taken, where it is a growth that lasted until then: not what its numbers made of the step."""
         found = self.seen["growth"]
-        lasted = bool(found) and found["end"] >= 0.8 * self._job.stepper.time
+        lasted = bool(found) and found["end"] >= 0.8 * self._stepper.time
         return f"{self.fed()[0]}; in the end {re.split('[:;]', given)[0]}" if lasted else given
 
     def _phase(self, touching: int) -> None:
@@ -138,14 +138,14 @@ class Watch:
             seen["phase"] += 1
 
     def _strain(self) -> None:
-        u = self._d.field(self._job.stepper.u)
+        u = self._d.field(self._stepper.u)
         if u is not None:
             self.seen["strain"] = max(self.seen["strain"], self._d.largest_strain(u))
 
     @cached_property
     def _allowed(self) -> tuple[float, float]:
         """Least and most temperature that initial, support and foundation data allow; infinite where sources know no bound."""
-        d, scene = self._d, self._job.scene
+        d, scene = self._d, self._scene
         if scene.heat is None:
             return -np.inf, np.inf
         loads, end, x = d.loads, scene.time.end, np.asarray(d.mesh.nodes)
@@ -173,7 +173,7 @@ class Watch:
         )
 
     def _temperatures(self) -> None:
-        theta = self._job.stepper.theta
+        theta = self._stepper.theta
         if theta is None or (low_high := self._allowed) == (-np.inf, np.inf):
             return
         low, high = low_high
@@ -194,20 +194,20 @@ class Watch:
             self.seen[name] = {
                 "bound": bound,
                 "value": float(value),
-                "count": int(self._job.comm.allreduce(int(count))),
-                "time": float(self._job.stepper.time),
+                "count": int(self._comm.allreduce(int(count))),
+                "time": float(self._stepper.time),
             }
 
-    def sentences(self) -> list[str]:
-        """All that is to be said of the run as it stands (collective)."""
-        if self._job.report is None:
+    def sentences(self, begun: bool, statistics: Statistics) -> list[str]:
+        """Warnings about the run as it stands, `begun` once a step was taken (collective)."""
+        if not begun:
             return before(self._d)
         self._strain()
         self._temperatures()
-        seen, heat = self.seen, self._job.scene.heat
-        out = [*before(self._d), *self.fed(), *self._digits(), *plausibility.strained(seen["strain"])]
+        seen, heat = self.seen, self._scene.heat
+        out = [*before(self._d), *self.fed(), *self._digits(statistics), *plausibility.strained(seen["strain"])]
         if self._law:
-            out += self._contact()
+            out += self._contact(statistics.stages)
         nodes = len(self._d.mesh.nodes)
         lumped = heat is not None and heat.capacity_matrix == "lumped"
         cure = "take longer steps or heat.capacity_matrix = 'lumped'"
@@ -215,13 +215,13 @@ class Watch:
             cure = "the mesh has obtuse angles, or the conductivity is not isotropic: refine it there"
         return out + plausibility.beyond(seen["low"], seen["high"], nodes, cure)
 
-    def _digits(self) -> list[str]:
+    def _digits(self, statistics: Statistics) -> list[str]:
         if self.seen["undetermined"]:
             return [plausibility.UNDETERMINED]
-        return plausibility.rounded(self._job.trusted())
+        return plausibility.rounded(statistics.trusted(self._stepper.extents))
 
-    def _contact(self) -> list[str]:
-        d, stepper, seen = self._d, self._job.stepper, self.seen
+    def _contact(self, stages: dict[str, int]) -> list[str]:
+        d, stepper, seen = self._d, self._stepper, self.seen
         u = d.field(stepper.u)
         moved = np.reshape(stepper.contact_displacement, (-1, d.dim))
         gap = d.load_vectors.on_points("gap", float(stepper.time))
@@ -239,10 +239,9 @@ class Watch:
             if here.any() and np.ptp(gap[of_part == i]) > 1e-12 * size(d):
                 facet = float(weights[of_part == i].max()) ** (1 / (d.dim - 1))
                 out += plausibility.slid(d.scene.contacts[i].part, float(slip[here].max()), facet)
-        return out + plausibility.impact(seen["shortest"]) + self._several()
+        return out + plausibility.impact(seen["shortest"]) + self._several(stages)
 
-    def _several(self) -> list[str]:
+    def _several(self, stages: dict[str, int]) -> list[str]:
         """Whether steps may have several solutions; the same on every rank (collective)."""
-        job = self._job
-        here = several_solutions.sentences(self._d, job.stepper, job.stages) if job.comm.rank == 0 else None
-        return list(job.comm.bcast(here, root=0))
+        here = several_solutions.sentences(self._d, self._stepper, stages) if self._comm.rank == 0 else None
+        return list(self._comm.bcast(here, root=0))

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from warmslip.scene.reader import load
 from warmslip.scene.scene import Scene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 
 # the tables of the whole model that each choice leaves out
@@ -72,7 +72,7 @@ def scene(full: Scene, chosen: dict[str, str]) -> Scene:
 class Floor:
     """The least code for a step: right-hand sides, one substitution a field. No contact, no balances, constant loads."""
 
-    def __init__(self, job: Run) -> None:
+    def __init__(self, job: Simulation) -> None:
         self._k, self._operators, self._stepper = job.scene.step, job.discretisation.operators, job.stepper
         force, heat, *_ = job.discretisation.load_vectors.at(self._k, self._k)
         kept: list[Any] = [v and v.copy() for v in (job.stepper.u, job.stepper.w, job.stepper.theta)]
@@ -114,7 +114,7 @@ class Floor:
 class March:
     """A run step by step, with the seconds of its contact solver and its balances. RuntimeError when a step is not right."""
 
-    def __init__(self, job: Run) -> None:
+    def __init__(self, job: Simulation) -> None:
         self._job, self._steps = job, job.steps()
         self.contact: list[float] = []
         self.books: list[float] = []
@@ -165,7 +165,7 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     `products` (of a matrix and a vector) and `newton_iterations` are counted, a step each.
     """
     product = PETSc.Log.Event("MatMult")
-    job, model = Run(scene(full, chosen)), Run(full)
+    job, model = Simulation(scene(full, chosen)), Simulation(full)
     one, whole_model, floor = March(job), March(model), Floor(job)
     times: dict[str, list[float]] = {"step": [], "least": [], "whole_model": []}
     products = 0

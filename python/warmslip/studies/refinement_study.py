@@ -23,7 +23,8 @@ from warmslip.model.discretisation import Discretisation, discretise, stress_mea
 from warmslip.records import provenance
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
-from warmslip.simulation.run import IDENTITIES, Run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.statistics import BALANCES
 from warmslip.simulation.summary import petsc_options
 from warmslip.studies.error_norms import Comparison, Largest
 
@@ -49,7 +50,7 @@ def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int
     return [(n, m) for n in sizes for m in sizes if (n, m) != (reference, reference)]
 
 
-def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
+def row(job: Simulation, errors: dict[str, float] | None) -> dict[str, Any]:
     """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
     s, d = job.stepper, job.discretisation
     cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
@@ -63,7 +64,7 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
         }
         | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
         | {"outcome": job.outcome}
-        | {f"identity_{name}": job.worst[name] for name in IDENTITIES}
+        | {f"identity_{name}": job.statistics.residuals[name] for name in BALANCES}
         | {
             "norm_u_V": d.norms.v(s.u) if moves else 0.0,
             "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
@@ -78,8 +79,8 @@ def row(job: Run, errors: dict[str, float] | None) -> dict[str, Any]:
             "open": report.open if report else 0,
             "stick": report.stick if report else 0,
             "slip": report.slip if report else 0,
-            "newton_largest": job.newton_max,
-            "safeguarded_steps": sum(count for stage, count in job.stages.items() if stage != "newton"),
+            "newton_largest": job.statistics.newton_max,
+            "safeguarded_steps": sum(count for stage, count in job.statistics.stages.items() if stage != "newton"),
             "unknowns": d.unknowns,
             "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
         }
@@ -115,11 +116,11 @@ def study(
         raise SceneError(f"--pace {pace} is no number of steps; give 1 or more")
     meshes: dict[int, Discretisation] = {}
 
-    def job(n: int, steps: int) -> Run:
+    def job(n: int, steps: int) -> Simulation:
         one = scene.override(**_mesh(scene, n), **{"time.steps": pace * steps})
         if n not in meshes:
             meshes[n] = discretise(one)
-        return Run(one, discretisation=replace(meshes[n], scene=one))
+        return Simulation(one, discretisation=replace(meshes[n], scene=one))
 
     finest = job(reference, reference)
     runs = [(job(n, m), Largest()) for n, m in members(levels, reference, grid)]
@@ -154,7 +155,7 @@ def _mesh(scene: Scene, level: int) -> dict[str, Any]:
     return {"mesh.n": level if len(set(axes)) == 1 else axes}
 
 
-def _next(steps: Any, run: Run) -> None:
+def _next(steps: Any, run: Simulation) -> None:
     if next(steps, None) is None:
         m = run.scene
         raise RuntimeError(

@@ -7,7 +7,8 @@ from typing import Any
 
 from warmslip.scene.errors import SceneError
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import FIELDS, IDENTITIES, Run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.statistics import BALANCES, FIELDS
 
 Overrides = dict[str, Any]
 
@@ -66,16 +67,16 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     """
     make, _ = LADDERS[ladder]
     line: dict[str, Any] = {"ladder": ladder, "value": value, "outcome": "", "reason": ""}
-    line |= dict.fromkeys([*IDENTITIES, *(f"error_{field}" for field in FIELDS), "disagreement"], float("nan")) | {
+    line |= dict.fromkeys([*BALANCES, *(f"error_{field}" for field in FIELDS), "disagreement"], float("nan")) | {
         "newton_largest": 0,
         "stage": "",
         "steps": 0,
     }
     try:
-        job = Run(scene.override(**make(value)))
+        job = Simulation(scene.override(**make(value)))
         for _ in job.steps():
             pass
-        other = Run(job.scene, backend="petsc")
+        other = Simulation(job.scene, backend="petsc")
         for _ in other.steps():
             pass
     except (SceneError, ValueError) as refusal:
@@ -83,14 +84,14 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     except (RuntimeError, MemoryError) as failure:
         return line | {"outcome": "solver_failed", "reason": str(failure).replace("\n", " "), "verdict": "stopped"}
     difference = disagreement(job, other)
-    reached = job.failure or job.worst  # of the step that was not taken, where there is one
+    reached = job.failure or job.statistics.residuals  # of the step that was not taken, where there is one
     line |= {"outcome": job.outcome, "disagreement": difference} | {
-        key: reached.get(key, float("nan")) for key in IDENTITIES
+        key: reached.get(key, float("nan")) for key in BALANCES
     }
-    line |= {f"error_{field}": value for field, value in job.trusted().items()}
+    line |= {f"error_{field}": value for field, value in job.statistics.trusted(job.stepper.extents).items()}
     line |= {
-        "newton_largest": job.newton_max,
-        "stage": max(job.stages, key=STAGES.index),
+        "newton_largest": job.statistics.newton_max,
+        "stage": max(job.statistics.stages, key=STAGES.index),
         "steps": job.stepper.cost.steps,
     }
     if job.outcome != "right":
@@ -98,7 +99,7 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     return line | {"verdict": "right" if difference <= AGREEMENT else "WRONG"}
 
 
-def disagreement(one: Run, other: Run) -> float:
+def disagreement(one: Simulation, other: Simulation) -> float:
     """Largest relative difference of the final norms of two runs; infinite when one went further."""
     if one.stepper.cost.steps != other.stepper.cost.steps:
         return float("inf")

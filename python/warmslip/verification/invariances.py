@@ -16,7 +16,7 @@ from warmslip._core import Mesh2, Mesh3, Outcome
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.materials import make_mesh
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.check import Line, below
 
@@ -46,13 +46,13 @@ UNITS = {
 
 def finish(scene: FullScene, mesh: Any = None, discretisation: Discretisation | None = None) -> dict[str, Array]:
     """The final u (nodes, d), w (nodes, d), theta (nodes,). Raises RuntimeError when the run does not end right."""
-    job = Run(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
+    job = Simulation(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
     for _ in job.steps():
         pass
     return state(job)
 
 
-def state(job: Run) -> dict[str, Array]:
+def state(job: Simulation) -> dict[str, Array]:
     if job.outcome != "right":
         raise RuntimeError(f"'{job.scene.title}' ended: {job.outcome}")
     return {name: job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")}
@@ -188,7 +188,7 @@ def _lists(d: int, nodes: Array, cells: Any, parts: dict[str, Any]) -> Any:
 
 def lines(name: str, scene: FullScene) -> list[Line]:
     """Every invariance of one scene, and the worst residual of each identity of its ledger."""
-    job = Run(scene)
+    job = Simulation(scene)
     for _ in job.steps():
         pass
     state(job)
@@ -200,7 +200,7 @@ def lines(name: str, scene: FullScene) -> list[Line]:
             worst,
             ROUND_OFF,
         )
-        for identity, worst in job.worst.items()
+        for identity, worst in job.statistics.residuals.items()
     ]
     checks: dict[str, Callable[[], float]] = {
         **{f"unchanged in other units of {key}": lambda u=u: units_apart(scene, u) for key, u in UNITS.items()},  # type: ignore[misc]

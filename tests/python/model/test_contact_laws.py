@@ -49,7 +49,7 @@ def test_the_scenes_own_law_written_in_python_gives_the_same(
 
 
 def test_an_exponential_law_closes_its_books(small: Small) -> None:
-    job = warmslip.Run(small(), laws={"bottom": Law(compliance=exponential)})
+    job = warmslip.Simulation(small(), laws={"bottom": Law(compliance=exponential)})
     for state, _ in job.steps():
         p, r = state.contact["pressure"], np.maximum(-state.contact["gap"], 0)
         assert np.abs(p - np.expm1(20 * r)).max() < 1e-11
@@ -132,7 +132,7 @@ def test_a_law_may_end_beyond_what_is_reached(small: Small) -> None:
     def ends(r: float) -> Sequence[float]:
         return linear(r) if r < 1.01 * reached else [math.exp(1e3)]
 
-    job = warmslip.Run(scene, laws={"bottom": Law(compliance=linear)})
+    job = warmslip.Simulation(scene, laws={"bottom": Law(compliance=linear)})
     reached = max(report.max_penetration for _, report in job.steps())
     assert job.outcome == "right" and reached > 0
     result = warmslip.run(scene, laws={"bottom": Law(compliance=ends)})

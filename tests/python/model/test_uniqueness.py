@@ -18,7 +18,7 @@ import pytest
 from support.processes import child_environment
 
 import warmslip
-from warmslip import Run, Scene
+from warmslip import Scene
 from warmslip.model import several_solutions
 from warmslip.model.discretisation import discretise
 from warmslip.model.linear_pieces import Solution, exact, solutions
@@ -26,6 +26,7 @@ from warmslip.model.uniqueness import ContactPoints, bound
 from warmslip.report import cost
 from warmslip.scene import plausibility
 from warmslip.scene.reader import build, load
+from warmslip.simulation.simulation import Simulation
 
 Array = Any
 MOST = 8  # points whose statuses are all looked at
@@ -50,7 +51,7 @@ def scaled(points: ContactPoints, factor: float) -> ContactPoints:
 
 def of_scene(name: str, **keys: Any) -> ContactPoints:
     """The contact points of a scene of the library, with a friction of 1."""
-    job = Run(load(name).override(**{key.replace("__", "."): value for key, value in keys.items()}))
+    job = Simulation(load(name).override(**{key.replace("__", "."): value for key, value in keys.items()}))
     points = several_solutions.condensed(job.discretisation, job.stepper)
     return replace(points, friction=np.ones(len(points.weights)))
 
@@ -275,7 +276,7 @@ def test_the_core_finds_the_one_solution_from_any_forces(d: int) -> None:
     scene = load("quasistatic_punch" if d == 2 else "block_3d").override(
         **{"mesh.n": 4, "time.steps": 4, "contact.stiffness": "rigid"}
     )
-    job = Run(scene)
+    job = Simulation(scene)
     factor = several_solutions.of_scene(job.discretisation, job.stepper).factor
     assert factor > 1
     scene = scene.override(**{"contact.friction.coefficient": 0.98 * factor * scene.contacts[0].friction.coefficient})
@@ -293,7 +294,7 @@ PUNCH: dict[str, Any] = {"mesh.n": 4, "supports.displacement": ["top"], "contact
 def test_the_core_finds_two_solutions_beyond_it() -> None:
     """A load on the contact nodes of a small body that is made to have several solutions: the core finds those it starts near."""
     scene = load("quasistatic_punch").override(**PUNCH)
-    job = Run(scene)
+    job = Simulation(scene)
     rough = scaled(several_solutions.condensed(job.discretisation, job.stepper), 1 / 0.3)
     factor = 1.2 * exact(rough)
     rough, scene = scaled(rough, factor), scene.override(**{"contact.friction.coefficient": factor})
@@ -327,7 +328,7 @@ def test_the_points_of_a_step_are_those_the_core_had() -> None:
         }
     )
     for scene in (drop, load("quasistatic_punch").override(**{"mesh.n": 5, "time.steps": 8})):
-        job, touched = Run(scene), 0
+        job, touched = Simulation(scene), 0
         for _, report in job.steps():
             touched += report.stick + report.slip
             points, free, penetration = several_solutions.posed(job.discretisation, job.stepper)
@@ -365,7 +366,7 @@ def test_a_run_says_that_a_step_may_have_several() -> None:
 def test_explain_says_how_much_friction_leaves_one() -> None:
     scene = load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8})
     (said,) = [one for one in cost.measured(scene).every_step if "one solution" in one]
-    job = Run(scene)
+    job = Simulation(scene)
     most = bound(replace(several_solutions.condensed(job.discretisation, job.stepper), friction=np.ones(9)))
     assert said.startswith("friction: one solution in every step for mu up to ")
     stated = float(said.removeprefix("friction: one solution in every step for mu up to ").split(";")[0])

@@ -193,7 +193,7 @@ def test_a_moving_support_has_the_velocity_of_every_step_size() -> None:
     scene = warmslip.load("quasistatic_punch").override(**{"mesh.n": 4, "time.steps": 8})
     alone = warmslip.run(scene.override(**{"time.steps": 4})).u
     shared = warmslip.discretise(scene)
-    run = warmslip.Run(
+    run = warmslip.Simulation(
         scene.override(**{"time.steps": 4}),
         discretisation=replace(shared, scene=scene.override(**{"time.steps": 4})),
     )
@@ -221,7 +221,7 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, name
 
 def test_the_column_creeps_as_its_two_exponentials_say() -> None:
     """The contact force at the end is the essay's, and the touch is where Kelvin-Voigt's column reaches the gap."""
-    job = warmslip.Run(warmslip.load("creep_column"))
+    job = warmslip.Simulation(warmslip.load("creep_column"))
     force = [report.normal_force for _, report in job.steps()]
     young, height, stiffness, gap, traction = 3.0, 2.0, 7.0, 0.3, 1.2
     final = stiffness * (height * (traction + stiffness * gap) / (young + stiffness * height) - gap)
@@ -233,7 +233,7 @@ def test_the_column_creeps_as_its_two_exponentials_say() -> None:
 
 def test_the_cylinder_presses_as_hertz_says() -> None:
     """From a block of finite size: peak pressure and half-width belong to the force within a hundredth."""
-    job = warmslip.Run(warmslip.load("hertz"))
+    job = warmslip.Simulation(warmslip.load("hertz"))
     for state, report in job.steps():
         pressure, force = state.contact["pressure"], report.normal_force
     peak = np.sqrt(force / (1 - 0.3**2) / (np.pi * 4.0))
@@ -247,7 +247,7 @@ def test_the_cylinder_presses_as_hertz_says() -> None:
 
 
 def test_the_waves_shake_the_body_and_do_not_drag_it() -> None:
-    job = warmslip.Run(warmslip.load("wavy_road"))
+    job = warmslip.Simulation(warmslip.load("wavy_road"))
     touching = []
     for state, report in job.steps():
         assert np.abs(state.contact["friction traction"]).max() == 0

@@ -14,9 +14,9 @@ from support.processes import Command
 from support.stopped import KilledError, readable, same, scene, stop_after
 
 import warmslip
-from warmslip import Run
 from warmslip.io import vtu
 from warmslip.simulation import checkpoint
+from warmslip.simulation.simulation import Simulation
 
 
 @pytest.fixture(name="small_disk")
@@ -92,4 +92,4 @@ def test_a_checkpoint_that_cannot_be_written_leaves_those_before(tmp_path: Path,
     assert (tmp_path / checkpoint.NAMES[0]).read_bytes() == before
     assert not (tmp_path / "checkpoint.part.npz").exists()
     monkeypatch.undo()
-    assert Run(scene()).resume(tmp_path) == 5
+    assert Simulation(scene()).resume(tmp_path) == 5

@@ -19,6 +19,7 @@ from warmslip.report import cost
 from warmslip.scene import plan
 from warmslip.scene.reader import build
 from warmslip.simulation import growth
+from warmslip.simulation.summary import summary
 
 STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
 # a column, as in test_coupling_limit, in steps of 0.54 where 0.533 is the longest that staggered ones stand
@@ -251,17 +252,17 @@ def test_undershoots_are_counted() -> None:
     ],
 )
 def test_what_temperatures_the_data_allow(keys: dict[str, Any], allowed: tuple[float, float]) -> None:
-    job = warmslip.Run(HOT.override(**keys))
-    assert job.watch._allowed == pytest.approx(allowed)
+    job = warmslip.Simulation(HOT.override(**keys))
+    assert job.monitor._allowed == pytest.approx(allowed)
 
 
 def test_heating_and_friction_leave_no_bound() -> None:
     warm = body(PRESSED, heat={"conductivity": 1.0, "capacity": 1.0}, initial={"temperature": 1.0})
-    assert warmslip.Run(warm).watch._allowed == (1.0, 1.0)
+    assert warmslip.Simulation(warm).monitor._allowed == (1.0, 1.0)
     rubbed = warm.override(**{"contact.friction_heating": {"share": 0.5}})
-    assert warmslip.Run(rubbed).watch._allowed == (1.0, np.inf)
+    assert warmslip.Simulation(rubbed).monitor._allowed == (1.0, np.inf)
     coupled = warm.override(**{"heat.heating": {"tensor": 0.1}})
-    assert warmslip.Run(coupled).watch._allowed == (-np.inf, np.inf)
+    assert warmslip.Simulation(coupled).monitor._allowed == (-np.inf, np.inf)
 
 
 def test_loads_in_python_are_not_called_idle_nor_asked_again() -> None:
@@ -280,7 +281,7 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
     """Strains at most five times, however many the steps, and a field is gathered for nothing else before the end."""
     ordinary, gathered = Discretisation.field, []
     monkeypatch.setattr(Discretisation, "field", lambda self, vec: gathered.append(1) or ordinary(self, vec))
-    job = warmslip.Run(body(PRESSED, time__steps=200))
+    job = warmslip.Simulation(body(PRESSED, time__steps=200))
     for _ in job.steps():
         pass
     assert 1 <= len(gathered) <= 5
@@ -325,13 +326,13 @@ def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(("mechanical", "told"), [(0.0, True), (1.0, True), (1e3, False)])
 def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bool) -> None:
     """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
-    job = warmslip.Run(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
+    job = warmslip.Simulation(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
     for n in range(60):
         heat = 1.2**n
         ledger = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
-        job.watch._growth(ledger, [])
-    assert bool(job.watch.fed()) == told
-    share = job.watch.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
+        job.monitor._growth(ledger, [])
+    assert bool(job.monitor.fed()) == told
+    share = job.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
     assert share == pytest.approx(0.0, abs=1e-12)
 
 
@@ -352,7 +353,7 @@ def test_two_ranks_say_it_once_and_the_same(command: Command, tmp_path: Path) ->
 @pytest.mark.parametrize("capacity", ["lumped", "consistent"])
 @pytest.mark.parametrize("level", [1.0, 293.15])
 def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str, level: float) -> None:
-    job = warmslip.Run(
+    job = warmslip.Simulation(
         build(
             {
                 "mesh": {"shape": "square" if d == 2 else "cube", "n": [2, 3, 2][:d]},
@@ -364,4 +365,4 @@ def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str
     )
     for _ in job.steps():
         pass
-    assert not [said for said in job.summary()["warnings"] if "the data allow" in said]
+    assert not [said for said in summary(job)["warnings"] if "the data allow" in said]

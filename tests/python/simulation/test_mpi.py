@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from support.processes import Command, child_environment
 
-from warmslip import Run, Trajectory, load
+from warmslip import Trajectory, load
+from warmslip.simulation.simulation import Simulation
 
 CASES = {
     "plane": ["paper_mixed", "mesh.n=8", "time.steps=8", "contact.heat_exchange.foundation_temperature=10"],
@@ -149,7 +150,7 @@ import warmslip
 
 gc.disable()
 for turn in range(4):
-    job = warmslip.Run(warmslip.load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
+    job = warmslip.Simulation(warmslip.load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
     for _ in job.steps():
         pass
     job.itself = job
@@ -169,7 +170,7 @@ def test_ranks_may_collect_a_dropped_run_at_different_times(tmp_path: Path) -> N
 
 
 def test_a_dropped_run_frees_its_memory_at_once() -> None:
-    job = Run(load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
+    job = Simulation(load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
     for _ in job.steps():
         pass
     dropped = weakref.ref(job)

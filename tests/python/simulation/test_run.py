@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import Loads, Run, Scene, Trajectory, _core
+from warmslip import Loads, Scene, Trajectory, _core
 from warmslip.io.trajectory_writer import LEDGER
 from warmslip.model.discretisation import discretise
-from warmslip.simulation import run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.statistics import worse
 
 MakeScene = Callable[..., Scene]
 FIELDS = ("u", "w", "theta")
@@ -118,10 +119,10 @@ def test_restart_under_a_moving_gap(small: MakeScene) -> None:
     """The energy that a moving foundation puts in is that of the gap before and after, and a restart knows the former."""
     scene = small("isotropic", time__steps=6)
     loads = replace(warmslip.Loads.of(scene), gap=lambda x, t: -1e-3 * (1 + t) + 0 * x[:, 0])
-    job = warmslip.Run(scene, loads=loads)
+    job = warmslip.Simulation(scene, loads=loads)
     ledgers = [report.ledger for _, report in job.steps()]
     gained = sum(ledger.contact_change for ledger in ledgers)
-    d, half = job.discretisation, warmslip.Run(scene, loads=loads)
+    d, half = job.discretisation, warmslip.Simulation(scene, loads=loads)
     assert gained == pytest.approx(ledgers[-1].contact - 0.5 * 1e4 * 1e-6, rel=1e-9)  # c_nu/2 g(0)^2 over a side of 1
     marching = half.steps()
     for _ in range(3):
@@ -197,7 +198,7 @@ def test_a_compliance_that_cannot_be_solved_for_is_refused(small: MakeScene, opt
     for key, value in {"ksp_type": "cg", "pc_type": "none", "ksp_max_it": "2"}.items():
         options[f"momentum_{key}"] = value
     with pytest.raises(ValueError, match="the momentum solver ended with DIVERGED_ITS; change the PETSc options"):
-        Run(small(), backend="petsc")
+        Simulation(small(), backend="petsc")
 
 
 @pytest.mark.parametrize("field", ["heat", "momentum"])
@@ -277,7 +278,7 @@ def test_a_needle_has_the_digits_it_states(small: MakeScene, keys: dict[str, Any
 def test_an_operator_without_inverse_is_refused(small: MakeScene) -> None:
     """A stiffness beyond the numbers of the machine: one sentence with the cure instead of PETSc's error."""
     with pytest.raises(ValueError, match=r"momentum operator could not be factored: .*; check the material"):
-        Run(small(elasticity__young=1e308, elasticity__poisson=0.9))
+        Simulation(small(elasticity__young=1e308, elasticity__poisson=0.9))
 
 
 def test_an_impossible_tolerance_is_an_outcome(small: MakeScene) -> None:
@@ -319,8 +320,8 @@ def test_a_step_that_does_not_close_its_books_is_not_taken(
 
 
 def test_a_nan_residual_is_the_worst() -> None:
-    assert run.worse(1.0, 2.0) == 2.0
-    assert np.isnan(run.worse(1.0, float("nan")))
+    assert worse(1.0, 2.0) == 2.0
+    assert np.isnan(worse(1.0, float("nan")))
 
 
 @pytest.mark.parametrize("coupling", ["staggered", "lagged", "monolithic"])
@@ -368,7 +369,7 @@ def test_backends_agree(small: MakeScene) -> None:
 
 
 def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
-    job = Run(small(initial__velocity=[1.0, 0.5], initial__temperature=2.0, initial__displacement=[0.1, 0.2]))
+    job = Simulation(small(initial__velocity=[1.0, 0.5], initial__temperature=2.0, initial__displacement=[0.1, 0.2]))
     d = job.discretisation
     u, w, theta = (d.field(getattr(job.stepper, name)) for name in FIELDS)
     top = np.unique(d.mesh.parts["top"])

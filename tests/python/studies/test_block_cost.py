@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from support.processes import Command
 
 from warmslip.report import cost as estimate
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies import block_cost
 
 FULL = block_cost.whole(4, 10)
@@ -44,11 +44,11 @@ def expected(chosen: dict[str, str]) -> list[str]:
 @pytest.mark.parametrize("chosen", ALL, ids=["; ".join(one.values()) for one in ALL])
 def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
     PETSc.Log.begin()
-    product, counted = PETSc.Log.Event("MatMult"), Run(block_cost.scene(FULL, chosen))
+    product, counted = PETSc.Log.Event("MatMult"), Simulation(block_cost.scene(FULL, chosen))
     before = product.getPerfInfo()["count"]
     assert sum(1 for _ in counted.steps()) == 10
     products = product.getPerfInfo()["count"] - before
-    job = Run(block_cost.scene(FULL, chosen))
+    job = Simulation(block_cost.scene(FULL, chosen))
     there = [name for name in OPERATORS if getattr(job.discretisation.operators, name) is not None]
     estimates = counted.stepper.cost.estimates * (("elasticity" in there) + ("heating" in there))
     assert products == 10 * len(there) + estimates and there == sorted(expected(chosen), key=OPERATORS.index)

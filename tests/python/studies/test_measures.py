@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import Run
+from warmslip import Simulation
 from warmslip.model.discretisation import discretise, stress_measures
 from warmslip.paper import readings
 from warmslip.scene.reader import load
@@ -67,7 +67,7 @@ def test_a_small_study() -> None:
     finest = warmslip.run(scene(8, 8)).summary
     for name in ("u_V", "u_L2", "w_L2", "theta_L2"):
         assert rows[-1][f"norm_{name}"] == pytest.approx(finest["norms"][name], rel=1e-12)
-    coarse, fine = Run(scene(4, 2)), Run(scene(8, 8))
+    coarse, fine = Simulation(scene(4, 2)), Simulation(scene(8, 8))
     compare, largest = Comparison(coarse.discretisation, fine.discretisation), Largest()
     marching = coarse.steps()
     for n, _ in enumerate(fine.steps(), 1):
@@ -146,7 +146,7 @@ def test_a_study_of_any_name_has_its_method_from_its_stamp(tmp_path: Path) -> No
 
 
 def test_disagreement_is_relative_and_sees_every_field() -> None:
-    one, other = Run(scene(2, 1)), Run(scene(2, 1))
+    one, other = Simulation(scene(2, 1)), Simulation(scene(2, 1))
     for job in (one, other):
         list(job.steps())
     assert robustness.disagreement(one, other) == 0
@@ -160,12 +160,12 @@ def test_disagreement_is_relative_and_sees_every_field() -> None:
 def test_a_cell_is_run_twice_by_different_linear_algebra(monkeypatch: pytest.MonkeyPatch) -> None:
     backends = []
 
-    class Noted(Run):
+    class Noted(Simulation):
         def __init__(self, *arguments: Any, **keys: Any) -> None:
             backends.append(keys.get("backend", "automatic"))
             super().__init__(*arguments, **keys)
 
-    monkeypatch.setattr(robustness, "Run", Noted)
+    monkeypatch.setattr(robustness, "Simulation", Noted)
     assert robustness.cell(scene(2, 2), "gap g", 0.0)["verdict"] == "right"
     assert backends == ["automatic", "petsc"]
     monkeypatch.setattr(robustness, "disagreement", lambda *_: 1e-3)

@@ -13,7 +13,7 @@ import pytest
 
 import warmslip
 from warmslip.paper import acceptance, readings
-from warmslip.simulation.run import IDENTITIES
+from warmslip.simulation.statistics import BALANCES
 from warmslip.studies import rates, refinement_study
 from warmslip.studies.error_norms import SUMS, TERMS
 
@@ -97,7 +97,7 @@ def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> l
             ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2"), larger
         )
         row |= {"safeguarded_steps": 0, "refinements": 9 if n > 64 else 0}
-        rows.append(row | {f"identity_{i}": 1e-15 for i in IDENTITIES})
+        rows.append(row | {f"identity_{i}": 1e-15 for i in BALANCES})
     return rows
 
 
@@ -221,7 +221,7 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
 def test_a_verdict_needs_something_to_judge(tmp_path: Path) -> None:
     nothing = dict(studies=[], manufactured_table=None, readings=None, extremes=None, expected={})
     assert not acceptance.verdict(**nothing)["passed"]
-    books = dict.fromkeys(IDENTITIES, 1e-12)
+    books = dict.fromkeys(BALANCES, 1e-12)
     cells = [{"ladder": "gap g", "value": 0.0, "verdict": v} | books for v in ("right", "WRONG")]
     assert acceptance.closed(cells[0])
     for name, size in {"law": 2e-8, "heat": 1e-8, "energy": 1e-8, "force": math.nan}.items():
@@ -238,7 +238,7 @@ def test_orders_have_a_band(tmp_path: Path, order: float, falls_short: bool) -> 
     rows = []
     for n in (8, 16, 32, 64):
         row = {"path": "h=k", "coupling": "staggered", "n": n, "h": 1 / n, "open": 0, "stick": 0}
-        rows.append(row | {f"e_{t}": (64 / n) ** order for t in TERMS} | {f"identity_{i}": 0.0 for i in IDENTITIES})
+        rows.append(row | {f"e_{t}": (64 / n) ** order for t in TERMS} | {f"identity_{i}": 0.0 for i in BALANCES})
     checks = acceptance.manufactured(write(tmp_path / "m.csv", rows), {})
     short = {c.name for c in checks if c.name.endswith(" order") and not c.passed}
     assert short == ({f"manufactured h=k staggered {t} order" for t in TERMS} if falls_short else set())

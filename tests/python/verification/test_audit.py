@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import warmslip
 from warmslip import Loads, Scene
 from warmslip.model.discretisation import discretise
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares, williams_exponent
 from warmslip.verification.assumptions.audit import audit, examine
 from warmslip.verification.assumptions.constants import decay_rate, trace_constants
@@ -123,7 +123,7 @@ def test_order_of_a_sudden_start(what: str, order: float, keys: dict[str, Any]) 
     """One step of k against 64 of k/64 leaves the order the audit entitles the field to."""
     field = what.split()[0]
 
-    def state(k: float, steps: int) -> Run:
+    def state(k: float, steps: int) -> Simulation:
         scene = fixtures.blank(
             **THIN, **keys, time__end=k, time__steps=steps, heat__conductivity=[[1.0, 0.0], [0.0, 1.0]]
         )

@@ -12,7 +12,7 @@ import warmslip
 from warmslip import Scene
 from warmslip.model.coupling import adiabatic_stiffness, coupling_rate, mandel_vector, staggered_limit
 from warmslip.model.discretisation import discretise
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.verification.assumptions.audit import examine
 from warmslip.verification.assumptions.constants import decay_rate
 from warmslip.verification.assumptions.coupling import lagged_margin
@@ -90,7 +90,7 @@ def test_paper_scene_with_opposite_coupling_beyond_the_limit() -> None:
             "initial.temperature": 1.0,
         }
         scene = warmslip.load("paper_consistent").override(**values)
-        job = Run(scene)
+        job = Simulation(scene)
         said = find(examine(job.discretisation), "coupling, staggered step")
         return said, [energy(job, 1.0) for _ in job.steps()]
 
@@ -199,7 +199,7 @@ def test_energy_does_not_grow_within_the_bounds(seed: int) -> None:
     k = staggered_limit(a, f, scale * m, r, rate)
     k = min(k, 5.0)
     assert k > 0
-    job = Run(scene(scale, k, "staggered"))
+    job = Simulation(scene(scale, k, "staggered"))
     assert find(examine(job.discretisation), "coupling, staggered step")["largest k"] >= 0.999 * k
     fixtures.start(job, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
     g = float(np.sqrt((scale**2 * m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
@@ -207,7 +207,7 @@ def test_energy_does_not_grow_within_the_bounds(seed: int) -> None:
     assert (np.diff(values) <= 1e-12 * values[0]).all()
 
     small = brentq(lambda s: lagged_margin(a, f, s * m, r, rate, 0.1), 1e-6 * scale, 4 * scale)
-    job = Run(scene(0.999 * small, 0.1, "lagged"))
+    job = Simulation(scene(0.999 * small, 0.1, "lagged"))
     assert find(examine(job.discretisation), "coupling, lagged step").holds == "yes"
     fixtures.start(job, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
     g = float(np.sqrt(small**2 * (m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))

@@ -12,6 +12,7 @@ import sympy as sp
 import warmslip
 from warmslip import Scene
 from warmslip.model.materials import make_mesh
+from warmslip.simulation.summary import summary
 from warmslip.studies.error_norms import TERMS
 from warmslip.verification.check import Line
 from warmslip.verification.mms import manufactured, solutions, symbolic
@@ -45,7 +46,7 @@ def test_report() -> None:
 def inexact(scene: Scene, solution: Manufactured) -> float:
     """Largest error of a run of `scene` over the norms at its end."""
     found, job = errors(scene, solution, mesh=distorted(scene))
-    norms = job.summary()["norms"]
+    norms = summary(job)["norms"]
     return max(found[term] / norms[term] for term in TERMS)
 
 

@@ -20,7 +20,7 @@ from warmslip.model.coupling import mandel_vector
 from warmslip.model.discretisation import discretise
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import entitled, observed
 from warmslip.studies.refinement_study import study
 from warmslip.verification.assumptions.audit import examine
@@ -35,7 +35,7 @@ LEVELS = (64, 128)  # each against its double
 TERMS, THETAS = ("u_V", "theta_L2"), (0.0, 10.0)
 
 
-def energy(job: Run, g: float) -> float:
+def energy(job: Simulation, g: float) -> float:
     """rho |w|^2/2 + a(u,u)/2 + Phi + g |theta|^2/2 of a state under nodal contact, energy; `g` as in `audit_coupling`."""
     d, s = job.discretisation, job.stepper
     normals = np.asarray(d.surface.normals)
@@ -61,7 +61,7 @@ def growth(scene: FullScene) -> float:
         **{"contact.heat_exchange.foundation_temperature": 0.0, "heat.source": 0.0, "loads": {"body": [0.0, 0.0]}},
         **{"initial.velocity": [0.5, -0.5], "initial.temperature": 1.0},
     )
-    job, g = Run(free), heat_weight(free)
+    job, g = Simulation(free), heat_weight(free)
     energies = [energy(job, g), *(energy(job, g) for _ in job.steps())]
     if job.outcome != "right":
         raise RuntimeError(f"the run without loads ended: {job.outcome}")
@@ -75,7 +75,7 @@ def other_answer(scene: FullScene) -> float:
     options.newton_steps, options.tolerance = 0, 1e-10
     how = {"k": scene.step, "coupling": getattr(Coupling, scene.time.coupling)}
     other = Stepper2(*(d.layout, d.problem, d.operators, d.surface), **how, backend=Backend.automatic, contact=options)
-    job, worst = Run(scene, discretisation=d), 0.0
+    job, worst = Simulation(scene, discretisation=d), 0.0
     before = [d.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")]
     for n, _ in enumerate(job.steps(), 1):
         force, heat, gap, *_ = d.load_vectors.at(n * scene.step)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from warmslip.model.loads import Loads
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.verification.check import Line, below, near
 from warmslip.verification.exact import fixtures
 
@@ -26,7 +26,7 @@ def pressure(stiffness: float) -> float:
     return stiffness * (M * THETA * HEIGHT - E * GAP) / (E + stiffness * HEIGHT)
 
 
-def _column(stiffness: float, gap: float, pull: float) -> Run:
+def _column(stiffness: float, gap: float, pull: float) -> Simulation:
     """The column at THETA before its step; `pull` is a traction at its foot, away from the clamp."""
     scene = fixtures.blank(
         time__steps=1,

@@ -12,7 +12,7 @@ from warmslip.model.loads import Loads
 from warmslip.model.materials import mandel
 from warmslip.scene.full import FullScene, build_full
 from warmslip.scene.tables import IsotropicTable
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.grading.meshes import Triangulation
 
@@ -72,30 +72,30 @@ def crossed(x: Array, y: Array) -> Triangulation:
     return Triangulation(np.vstack([grid.reshape(-1, 2), middle.reshape(-1, 2)]), np.vstack(cells), parts)
 
 
-def run(scene: FullScene, loads: Loads | None = None, mesh: Triangulation | None = None) -> Run:
+def run(scene: FullScene, loads: Loads | None = None, mesh: Triangulation | None = None) -> Simulation:
     """A scene ready to be stepped by `steps`, with its own loads and mesh where none are given."""
-    return Run(scene, discretisation=discretise(scene, loads=loads, mesh=None if mesh is None else mesh.mesh()))
+    return Simulation(scene, discretisation=discretise(scene, loads=loads, mesh=None if mesh is None else mesh.mesh()))
 
 
-def steps(job: Run) -> Iterator[Any]:
+def steps(job: Simulation) -> Iterator[Any]:
     """A report a step. Raises RuntimeError when a step is not right: a closed form has nothing to say about it."""
     yield from (report for _, report in job.steps())
     if job.outcome != "right":
         raise RuntimeError(f"the run ended: {job.outcome}, {job.failure}")
 
 
-def nodes(job: Run) -> Array:
+def nodes(job: Simulation) -> Array:
     """Positions of the nodes, (nodes, 2)."""
     return np.asarray(job.discretisation.mesh.nodes)
 
 
-def fields(job: Run) -> tuple[Array, Array, Array]:
+def fields(job: Simulation) -> tuple[Array, Array, Array]:
     """u, w (nodes, 2) and theta (nodes,) of the present state."""
     d, s = job.discretisation, job.stepper
     return d.field(s.u), d.field(s.w), d.field(s.theta)
 
 
-def start(job: Run, *, u: Array | float = 0.0, w: Array | float = 0.0, theta: Array | float = 0.0) -> None:
+def start(job: Simulation, *, u: Array | float = 0.0, w: Array | float = 0.0, theta: Array | float = 0.0) -> None:
     """Sets the initial state; values broadcast to (nodes, 2), (nodes, 2) and (nodes,)."""
     n = len(nodes(job))
     displacement, velocity = (np.array(np.broadcast_to(v, (n, 2)), dtype=float) for v in (u, w))
@@ -103,7 +103,7 @@ def start(job: Run, *, u: Array | float = 0.0, w: Array | float = 0.0, theta: Ar
     job.discretisation.restart(job.stepper, displacement, velocity, temperature, 0.0)
 
 
-def mean(job: Run, field: Array) -> Array:
+def mean(job: Simulation, field: Array) -> Array:
     """Mean over the body of a P1 field (nodes, ...), exactly."""
     cells = np.asarray(job.discretisation.mesh.cells)
     x = nodes(job)[cells]
@@ -111,7 +111,7 @@ def mean(job: Run, field: Array) -> Array:
     return np.asarray(np.tensordot(area, field[cells].mean(axis=1), axes=1) / area.sum())
 
 
-def on(job: Run, part: str) -> Any:
+def on(job: Simulation, part: str) -> Any:
     """Numbers of the nodes on a boundary part."""
     return np.unique(job.discretisation.mesh.parts[part])
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warmslip.model.loads import Loads
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.exact import fixtures
 from warmslip.verification.grading.meshes import Triangulation
@@ -55,7 +55,7 @@ class HalfPlane:
         x, y = (_lines(start, self.size, self.bricks) for start in (1.25, 1.0))
         return fixtures.crossed(np.concatenate([-x[:0:-1], x]), y)
 
-    def job(self, steps: int, shear: Callable[[float], float]) -> Run:
+    def job(self, steps: int, shear: Callable[[float], float]) -> Simulation:
         """A run of `steps` steps under P and, at time t, the tangential load shear(t), per thickness."""
         scene = fixtures.blank(
             time__end=self.step * steps,
@@ -105,7 +105,7 @@ class Foot:
     weight: Array
 
     @classmethod
-    def of(cls, job: Run) -> Foot:
+    def of(cls, job: Simulation) -> Foot:
         surface = job.discretisation.surface
         x, weight = np.asarray(surface.positions)[:, 0], np.asarray(surface.weights)
         order = np.argsort(x)

@@ -14,7 +14,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import eigsh
 
 from warmslip.model.loads import Loads
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
 from warmslip.verification.check import Line, below, order
@@ -33,7 +33,7 @@ def _scipy(matrix: Any) -> Any:
     return out
 
 
-def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Run:
+def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Simulation:
     scene = fixtures.blank(
         time__end=k * steps,
         time__steps=steps,
@@ -46,7 +46,7 @@ def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Run:
     return fixtures.run(scene, Loads(gap=FAR), mesh)
 
 
-def _modes(job: Run, count: int) -> tuple[Array, Array]:
+def _modes(job: Simulation, count: int) -> tuple[Array, Array]:
     """The lowest eigenvalues omega^2 (count,) and modes (count, nodes, 2) of the clamped body, mass-normalised."""
     d = job.discretisation
     unit = 1 / d.full.inertia.density  # the density of the prediction is the one written above

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warmslip.model.loads import Loads
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.check import Line, below, near
 from warmslip.verification.exact import fixtures
@@ -26,7 +26,7 @@ PRESSURE = 0.4
 
 def _pressed(
     steps: int, k: float, shear_rate: float, shear: float, body: float, top: float
-) -> tuple[Run, Array, Array]:
+) -> tuple[Simulation, Array, Array]:
     """A floating block under PRESSURE and a shear stress that is uniform at first, with the gradients of u(0) and w(0).
 
     sigma_xy = 2 mu (shear + t shear_rate) + 2 mu_A shear_rate, sigma_yy = -PRESSURE, sigma_xx = 0; `body` is a body force along

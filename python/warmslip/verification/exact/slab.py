@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies.error_norms import ExactErrors
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
@@ -59,7 +59,7 @@ def _scene(n: int, end: float, steps: int) -> FullScene:
     )
 
 
-def _march(n: int, end: float, steps: int) -> Run:
+def _march(n: int, end: float, steps: int) -> Simulation:
     job = fixtures.run(_scene(n, end, steps))
     for _ in fixtures.steps(job):
         pass

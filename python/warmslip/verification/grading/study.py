@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.materials import make_mesh
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import IDENTITIES, residuals, worse
+from warmslip.simulation.statistics import BALANCES, residuals, worse
 from warmslip.studies import rates
 from warmslip.studies.error_norms import TERMS, Comparison, Largest
 from warmslip.verification.assumptions.corners import corner_exponents
@@ -46,7 +46,7 @@ class March:
     def __init__(self, scene: FullScene, mesh: Any, blocks: list[TimeBlock]) -> None:
         self.discretisation: Discretisation = discretise(scene, mesh=mesh)
         self.blocks, self.stepper, self.steps = blocks, None, 0
-        self.worst = dict.fromkeys(IDENTITIES, 0.0)
+        self.worst = dict.fromkeys(BALANCES, 0.0)
 
     def advance(self) -> Iterator[Any]:
         """A report a step. Raises RuntimeError, with the outcome, when a step is not right."""
@@ -120,7 +120,7 @@ def study(
             "cells": len(run.discretisation.mesh.cells),
             **{f"e_{term}": found.values[term] for term in TERMS},
             **{f"gap_{term}": gap.values[term] for term in TERMS},
-            **{f"identity_{name}": run.worst[name] for name in IDENTITIES},
+            **{f"identity_{name}": run.worst[name] for name in BALANCES},
         }
         for n, run, found, gap in zip(sizes[:-1], runs, largest, gaps, strict=True)
     ]
@@ -186,5 +186,5 @@ def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: li
         for term in TERMS if kind == "graded" else ("u_V", "theta_L2"):
             what = f"{term} of the {kind} grids follows one power: misfit of the fitted reference"
             out.append(below(name, what, "theory", table[-1][f"misfit_{term}"], 0.02))
-    worst = max(row[f"identity_{identity}"] for row in [*graded, *uniform] for identity in IDENTITIES)
+    worst = max(row[f"identity_{identity}"] for row in [*graded, *uniform] for identity in BALANCES)
     return [*out, below(name, "the books of every step close", "identity", worst, 1e-11)]

@@ -17,7 +17,7 @@ import sympy as sp
 
 from warmslip.model.discretisation import discretise
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies import rates
 from warmslip.studies.error_norms import TERMS, ExactErrors, Largest
 from warmslip.typing import Array
@@ -136,14 +136,14 @@ def slipping(scene: FullScene) -> Manufactured:
 
 
 def errors(
-    scene: FullScene, solution: Manufactured, *, mesh: Any = None, watch: Callable[[Run], None] | None = None
-) -> tuple[dict[str, float], Run]:
+    scene: FullScene, solution: Manufactured, *, mesh: Any = None, watch: Callable[[Simulation], None] | None = None
+) -> tuple[dict[str, float], Simulation]:
     """Largest errors over all times of a run with the manufactured data, and the run.
 
     `mesh` replaces the scene's structured one; `watch` sees the run after every step. Raises RuntimeError when a step is not
     right.
     """
-    job = Run(scene, discretisation=discretise(scene, loads=solution.loads, mesh=mesh))
+    job = Simulation(scene, discretisation=discretise(scene, loads=solution.loads, mesh=mesh))
     d = job.discretisation
     nodes = np.asarray(d.mesh.nodes)
     d.restart(job.stepper, solution.u(nodes, 0.0), solution.w(nodes, 0.0), solution.theta(nodes, 0.0), 0.0)
@@ -187,7 +187,7 @@ def table(scene: FullScene, couplings: list[str], levels: list[int], path: str) 
             line |= {f"e_{t}": found[t] for t in TERMS}
             line |= {f"order_{t}": rates.observed(before[t], found[t]) if before else float("nan") for t in TERMS}
             line |= {"slip": job.report.slip, "stick": job.report.stick, "open": job.report.open}
-            line |= {f"identity_{name}": value for name, value in job.worst.items()}
+            line |= {f"identity_{name}": value for name, value in job.statistics.residuals.items()}
             out.append(line)
             before = found
     return out

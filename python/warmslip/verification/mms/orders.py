@@ -14,7 +14,7 @@ import numpy as np
 
 from warmslip.model.materials import make_mesh
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies import rates
 from warmslip.verification import check
 from warmslip.verification.check import Line
@@ -47,7 +47,9 @@ class Family:
         return [self.scene.override(**{"mesh.n": n, "time.steps": steps}) for n, steps in self.grids]
 
 
-def measure(family: Family, watch: Callable[[Run], None] | None = None) -> tuple[list[dict[str, float]], Manufactured]:
+def measure(
+    family: Family, watch: Callable[[Simulation], None] | None = None
+) -> tuple[list[dict[str, float]], Manufactured]:
     """Largest errors over time on every grid of the family, and the solution, which is derived once.
 
     Raises ValueError for fewer than three grids, and for data of the discrete scheme, which belong to one step size, on

@@ -14,7 +14,8 @@ import numpy as np
 
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 from warmslip.studies.error_norms import TERMS
 from warmslip.verification import check
 from warmslip.verification.check import Line
@@ -62,7 +63,7 @@ def exactness(dim: int, coupling: str) -> Line:
     """Affine fields on a distorted mesh: the largest error at any step over the field's norm at the end."""
     scene = setting(dim, {"mesh.n": 5 if dim == 2 else 3, "time.steps": 5}, coupling=coupling, floating=True)
     found, job = errors(scene, derive(scene, affine(scene, scene.step)), mesh=distorted(scene))
-    norms = job.summary()["norms"]
+    norms = summary(job)["norms"]
     return check.below(
         f"affine fields on a distorted mesh, {dim}D, {coupling}",
         "every term of both balances and of the contact law has its factor, sign and time index",
@@ -77,7 +78,7 @@ def sticking(dim: int, quadrature: str) -> Line:
     scene = setting(dim, {"mesh.n": 8 if dim == 2 else 4, "time.steps": 8, "contact.quadrature": quadrature})
     worst, fastest = 0.0, 0.0
 
-    def watch(job: Run) -> None:
+    def watch(job: Simulation) -> None:
         nonlocal worst, fastest
         w = job.discretisation.field(job.stepper.w)
         touching = np.unique(job.discretisation.mesh.parts[scene.contact.part])
@@ -107,7 +108,7 @@ def status(name: str, n: int) -> Line:
     place = symbolic.function(change, 2)
     worst = 0.0
 
-    def watch(job: Run) -> None:
+    def watch(job: Simulation) -> None:
         nonlocal worst
         x = np.asarray(job.discretisation.surface.positions)
         distance = x[:, 0] - place(x, job.stepper.time)

@@ -50,7 +50,7 @@ from warmslip.model.loads import evaluate
 from warmslip.model.materials import make_mesh
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
 from warmslip.verification import check
@@ -134,7 +134,7 @@ class Bound:
             total += sign * rule.integral(work)
         return total
 
-    def __call__(self, job: Run) -> None:
+    def __call__(self, job: Simulation) -> None:
         """Adds the squares at the time of the run."""
         exact, body, nodes, k = self._exact, self._body, self._nodes, self._k
         d, t, x, rule = job.discretisation, job.stepper.time, body.x, self._contact

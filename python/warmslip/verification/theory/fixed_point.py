@@ -12,7 +12,7 @@ import numpy as np
 
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.full import FullScene
-from warmslip.simulation.run import Run
+from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 
 ROUND_OFF = 1e-13  # of the first difference: what follows is rounding, no contraction
@@ -39,7 +39,7 @@ def _right(outcome: str, scene: FullScene) -> None:
 
 def solution(scene: FullScene) -> Fields:
     """The scene's run with its own coupling. Raises RuntimeError when it does not end right."""
-    job = Run(scene)
+    job = Simulation(scene)
     d = job.discretisation
     found = [(d.field(job.stepper.w), d.field(job.stepper.theta)) for _ in job.steps()]
     _right(job.outcome, scene)
