@@ -16,7 +16,7 @@ void bind(py::module_& m) {
             return std::make_shared<Mesh<d>>(box<d>(counts, lengths, diagonal));
           },
           py::arg("counts"), py::arg("lengths"), py::arg("diagonal"),
-          "Box of counts[a] bricks along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, "
+          "Box of counts[a] cells along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, "
           "back).")
       .def_static(
           "from_lists",

@@ -34,8 +34,10 @@ void bind(py::module_& m) {
                        m, name<d>("Operators").c_str(),
                        "The constant matrices as petsc4py objects, without boundary conditions; None is absent.")
                        .def(py::init<const L&, const Problem<d>&>(), py::arg("layout"), py::arg("problem"))
-                       .def_readonly("clamped", &O::clamped, "Global scalar indices with u = 0 owned by this rank.")
-                       .def_readonly("cooled", &O::cooled, "Global nodes with theta = 0 owned by this rank.");
+                       .def_readonly("prescribed_displacement", &O::prescribed_displacement,
+                                     "Global scalar indices with u = 0 owned by this rank.")
+                       .def_readonly("prescribed_temperature", &O::prescribed_temperature,
+                                     "Global nodes with theta = 0 owned by this rank.");
   const auto matrix = [&](const char* attribute, MatHandle O::*member, const char* doc) {
     operators.def_property_readonly(
         attribute, [member](const O& o) { return share(o.*member); }, doc);
@@ -54,10 +56,11 @@ void bind(py::module_& m) {
   m.def(
       "momentum_matrix",
       [](const L& l, const Problem<d>& p, const O& o, double k) { return release(momentum_matrix<d>(l, p, o, k)); },
-      py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("k"), "rho M / k + B + k A, clamped.");
+      py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("k"),
+      "rho M / k + B + k A with prescribed displacements eliminated.");
   m.def(
       "heat_matrix", [](const O& o, double k) { return release(heat_matrix<d>(o, k)); }, py::arg("operators"),
-      py::arg("k"), "M / k + D + J, cooled.");
+      py::arg("k"), "M / k + D + J with prescribed temperatures eliminated.");
 
   using S = ContactSurface<d>;
   py::class_<S, std::shared_ptr<S>>(m, name<d>("ContactSurface").c_str(),

@@ -41,14 +41,16 @@ void bind(py::module_& m) {
   py::class_<P, std::shared_ptr<P>>(m, name<d>("Problem").c_str(), "A mesh with materials, supports and contact parts.")
       .def(
           py::init([](std::shared_ptr<Mesh<d>> mesh, std::vector<M> materials, std::vector<int> regions,
-                      std::vector<std::string> clamped, std::vector<std::string> cooled,
+                      std::vector<std::string> prescribed_displacement, std::vector<std::string> prescribed_temperature,
                       std::vector<ContactPart> contacts, bool lumped) {
-            return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions), std::move(clamped),
-                                         std::move(cooled), std::move(contacts), lumped});
+            return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions),
+                                         std::move(prescribed_displacement), std::move(prescribed_temperature),
+                                         std::move(contacts), lumped});
           }),
-          py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("clamped"),
-          py::arg("cooled"), py::arg("contacts"), py::arg("lumped"),
-          "`regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; "
+          py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("prescribed_displacement"),
+          py::arg("prescribed_temperature"), py::arg("contacts"), py::arg("lumped"),
+          "`regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` "
+          "are parts with given u and theta; "
           "`lumped` makes capacity and exchange diagonal.")
       .def_property_readonly("mesh", [](const P& p) { return std::const_pointer_cast<Mesh<d>>(p.mesh); })
       .def_readonly("materials", &P::materials)
@@ -72,9 +74,10 @@ void bind(py::module_& m) {
 void bind_problem(py::module_& m) {
   using Pressure = std::function<std::array<double, 3>(double)>;
   using Bound = std::function<std::array<double, 3>(double, double)>;
-  py::class_<NormalCompliance>(m, "NormalCompliance", "p_nu(r) = min(stiffness max(r, 0)^exponent, most) (2.8).")
+  py::class_<NormalCompliance>(m, "NormalCompliance",
+                               "p_nu(r) = min(stiffness max(r, 0)^exponent, pressure_limit) (2.8).")
       .def(py::init<double, double, double, Pressure>(), py::kw_only(), py::arg("stiffness"), py::arg("exponent"),
-           py::arg("most"), py::arg("custom"),
+           py::arg("pressure_limit"), py::arg("custom"),
            "`custom`, when not None, takes its place: r > 0 to (pressure, derivative, energy).")
       .def("pressure", &NormalCompliance::pressure, py::arg("penetration"))
       .def("energy", &NormalCompliance::energy, py::arg("penetration"))
@@ -93,15 +96,14 @@ void bind_problem(py::module_& m) {
       .def_readonly("friction", &ContactLaw::friction);
   py::class_<ContactPart>(m, "ContactPart", "One part of Gamma_C; without a law it only exchanges heat.")
       .def(py::init([](std::string part, std::optional<ContactLaw> law, int quadrature, double conductance,
-                       double per_pressure, double friction_share) {
-             return ContactPart{
-                 std::move(part), std::move(law), {quadrature}, conductance, {per_pressure, friction_share}};
+                       double per_pressure, double share) {
+             return ContactPart{std::move(part), std::move(law), {quadrature}, conductance, {per_pressure, share}};
            }),
            py::kw_only(), py::arg("part"), py::arg("law"), py::arg("quadrature"), py::arg("conductance"),
-           py::arg("per_pressure"), py::arg("friction_share"),
+           py::arg("per_pressure"), py::arg("share"),
            "quadrature 0 is nodal, n Gauss's with n points; q . nu = (conductance + per_pressure p_nu) (theta - "
            "theta_F) "
-           "- friction_share |sigma_tau . w_tau|.")
+           "- share |sigma_tau . w_tau|.")
       .def_readonly("part", &ContactPart::part)
       .def_readonly("law", &ContactPart::law);
   bind<2>(m);

@@ -11,7 +11,7 @@ void bind(py::module_& m) {
   using R = StepReport<d>;
   py::class_<R>(m, name<d>("StepReport").c_str(), "What one step did.")
       .def_readonly("outcome", &R::outcome)
-      .def_readonly("reason", &R::reason, "of an outcome that is not right, in words")
+      .def_readonly("reason", &R::reason, "of a step that was rejected, in words")
       .def_readonly("stage", &R::stage)
       .def_readonly("newton_iterations", &R::newton_iterations)
       .def_readonly("open", &R::open)
@@ -21,7 +21,7 @@ void bind(py::module_& m) {
       .def_readonly("normal_force", &R::normal_force, "int p_nu, force")
       .def_readonly("traction", &R::traction, "int sigma nu over Gamma_C, (d)")
       .def_readonly("friction_traction", &R::friction_traction, "its tangential part, (d)")
-      .def_readonly("ledger", &R::ledger)
+      .def_readonly("balances", &R::balances)
       .def_readonly("errors", &R::errors, "estimated, of the fields")
       .def_readonly("undetermined", &R::undetermined, "a change of the loads has no definite answer");
 
@@ -75,7 +75,7 @@ void bind(py::module_& m) {
       .def("part", &S::part, py::arg("strained"), py::arg("strained_w"), py::arg("rigid"),
            "After `start`: displacement and velocity of a body without supports but for rigid motions, and the "
            "velocities of those.")
-      .def("forget", &S::forget, "Drops what is remembered of earlier steps beside the state.")
+      .def("clear_cache", &S::clear_cache, "Drops what is remembered of earlier steps beside the state.")
       .def(
           "advance",
           [](S& s, const Maybe& force, const Maybe& heat, const Eigen::VectorXd& gap, const Maybe& velocity,
@@ -85,7 +85,7 @@ void bind(py::module_& m) {
           },
           py::arg("force"), py::arg("heat"), py::arg("gap"), py::arg("support_velocity") = py::none(),
           py::arg("support_temperature") = py::none(), py::arg("foundation") = Eigen::VectorXd(),
-          py::arg("measured") = false, "One step; the state stays when the outcome is not right. See StepLoads.")
+          py::arg("measured") = false, "One step; the state stays when the outcome is not completed. See StepLoads.")
       .def_property_readonly(
           "u", [](const S& s) { return share(s.level().u); },
           "Displacement. The vectors change owner at every step: ask again.")
@@ -163,10 +163,10 @@ void bind_stepper(py::module_& m) {
       .value("lagged", Coupling::lagged)
       .value("monolithic", Coupling::monolithic);
   py::enum_<Outcome>(m, "Outcome")
-      .value("right", Outcome::right)
+      .value("completed", Outcome::completed)
       .value("contact_not_converged", Outcome::contact_not_converged)
       .value("not_finite", Outcome::not_finite)
-      .value("identity_violated", Outcome::identity_violated)
+      .value("balance_violated", Outcome::balance_violated)
       .value("precision_lost", Outcome::precision_lost)
       .value("unsupported", Outcome::unsupported)
       .value("solver_failed", Outcome::solver_failed);
@@ -174,7 +174,7 @@ void bind_stepper(py::module_& m) {
       .value("none", Stage::none)
       .value("newton", Stage::newton)
       .value("restart", Stage::restart)
-      .value("fixed_point", Stage::fixed_point)
+      .value("tresca_fixed_point", Stage::tresca_fixed_point)
       .value("enumeration", Stage::enumeration);
   py::class_<ContactOptions>(m, "ContactOptions")
       .def(py::init<>())
@@ -183,43 +183,43 @@ void bind_stepper(py::module_& m) {
       .def_readwrite("fixed_point_steps", &ContactOptions::fixed_point_steps)
       .def_readwrite("enumerate_points", &ContactOptions::enumerate_points);
 
-  auto ledger = py::class_<Ledger>(m, "Ledger", "Terms and relative residuals of the balances of one step.");
+  auto balances = py::class_<Balances>(m, "Balances", "Terms and relative residuals of the balances of one step.");
   py::list terms;
-  const auto term = [&](const char* attribute, double Ledger::*member) {
-    ledger.def_readonly(attribute, member);
+  const auto term = [&](const char* attribute, double Balances::*member) {
+    balances.def_readonly(attribute, member);
     terms.append(attribute);
   };
-  term("kinetic", &Ledger::kinetic);
-  term("elastic", &Ledger::elastic);
-  term("contact", &Ledger::contact);
-  term("kinetic_change", &Ledger::kinetic_change);
-  term("elastic_change", &Ledger::elastic_change);
-  term("contact_change", &Ledger::contact_change);
-  term("inertia_damping", &Ledger::inertia_damping);
-  term("elastic_damping", &Ledger::elastic_damping);
-  term("contact_damping", &Ledger::contact_damping);
-  term("viscous", &Ledger::viscous);
-  term("friction", &Ledger::friction);
-  term("load_work", &Ledger::load_work);
-  term("expansion_work", &Ledger::expansion_work);
-  term("gap_work", &Ledger::gap_work);
-  term("support_work", &Ledger::support_work);
-  term("heat_change", &Ledger::heat_change);
-  term("heat_damping", &Ledger::heat_damping);
-  term("conducted", &Ledger::conducted);
-  term("exchanged", &Ledger::exchanged);
-  term("supplied", &Ledger::supplied);
-  term("heating", &Ledger::heating);
-  term("friction_heating", &Ledger::friction_heating);
-  term("held", &Ledger::held);
-  term("energy_residual", &Ledger::energy_residual);
-  term("heat_residual", &Ledger::heat_residual);
-  term("force_residual", &Ledger::force_residual);
-  term("law_residual", &Ledger::law_residual);
-  term("force_defect", &Ledger::force_defect);
-  term("heat_defect", &Ledger::heat_defect);
-  term("force_scale", &Ledger::force_scale);
-  ledger.attr("terms") = py::tuple(terms);
+  term("kinetic", &Balances::kinetic);
+  term("elastic", &Balances::elastic);
+  term("contact", &Balances::contact);
+  term("kinetic_change", &Balances::kinetic_change);
+  term("elastic_change", &Balances::elastic_change);
+  term("contact_change", &Balances::contact_change);
+  term("inertia_damping", &Balances::inertia_damping);
+  term("elastic_damping", &Balances::elastic_damping);
+  term("contact_damping", &Balances::contact_damping);
+  term("viscous", &Balances::viscous);
+  term("friction", &Balances::friction);
+  term("load_work", &Balances::load_work);
+  term("expansion_work", &Balances::expansion_work);
+  term("gap_work", &Balances::gap_work);
+  term("support_work", &Balances::support_work);
+  term("heat_change", &Balances::heat_change);
+  term("heat_damping", &Balances::heat_damping);
+  term("conducted", &Balances::conducted);
+  term("exchanged", &Balances::exchanged);
+  term("supplied", &Balances::supplied);
+  term("heating", &Balances::heating);
+  term("friction_heating", &Balances::friction_heating);
+  term("support_heat", &Balances::support_heat);
+  term("energy_residual", &Balances::energy_residual);
+  term("heat_residual", &Balances::heat_residual);
+  term("force_residual", &Balances::force_residual);
+  term("law_residual", &Balances::law_residual);
+  term("force_defect", &Balances::force_defect);
+  term("heat_defect", &Balances::heat_defect);
+  term("force_scale", &Balances::force_scale);
+  balances.attr("terms") = py::tuple(terms);
 
   auto errors = py::class_<Errors>(
       m, "Errors", "Estimated relative errors of the fields of one step; nan is absent or not measured.");
@@ -246,7 +246,7 @@ void bind_stepper(py::module_& m) {
   item("momentum_seconds", &Cost::momentum_seconds);
   item("contact_seconds", &Cost::contact_seconds);
   item("heat_seconds", &Cost::heat_seconds);
-  item("books_seconds", &Cost::books_seconds);
+  item("balance_seconds", &Cost::balance_seconds);
   item("steps", &Cost::steps);
   item("refinements", &Cost::refinements);
   item("estimates", &Cost::estimates);

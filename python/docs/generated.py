@@ -86,11 +86,11 @@ def _rows(table: dict[str, Any]) -> list[str]:
     for key, value in table["properties"].items():
         default = value.get("default")
         needed = key in table.get("required", [])
-        shown = "**needed**" if needed else "" if default is None else f"`{json.dumps(default)}`"
+        display = "**needed**" if needed else "" if default is None else f"`{json.dumps(default)}`"
         meaning = value.get("description", "")
         if "$ref" in json.dumps(value):
             continue  # a table of its own
-        rows.append(f"| `{key}` | {_cell(_kind(value))} | {shown} | {_cell(meaning)} |")
+        rows.append(f"| `{key}` | {_cell(_kind(value))} | {display} | {_cell(meaning)} |")
     return rows
 
 
@@ -156,10 +156,10 @@ def core() -> str:
             if isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
                 property_ = any(getattr(d, "id", "") == "property" for d in member.decorator_list)
                 arguments = [a.arg for a in (*member.args.args, *member.args.kwonlyargs)][1:]
-                shown = member.name if property_ else f"{member.name}({', '.join(arguments)})"
+                display = member.name if property_ else f"{member.name}({', '.join(arguments)})"
                 meaning = _cell(ast.get_docstring(member) or _comment(name.rstrip("2"), member.name))
                 out.append(
-                    f"| `{shown}` | {_type(ast.unparse(member.returns) if member.returns else '')} | {meaning} |"
+                    f"| `{display}` | {_type(ast.unparse(member.returns) if member.returns else '')} | {meaning} |"
                 )
     return "\n".join(out)
 

@@ -9,7 +9,7 @@ import numpy.typing
 import petsc4py.PETSc
 import scipy.sparse
 import typing
-__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Ledger', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Balances', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
 class Diagonal:
     """
     Members:
@@ -65,7 +65,7 @@ class Mesh2:
     @staticmethod
     def box(counts: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"], lengths: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"], diagonal: Diagonal) -> Mesh2:
         """
-        Box of counts[a] bricks along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
+        Box of counts[a] cells along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
         """
     @staticmethod
     def from_lists(nodes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], cells: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"], parts: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"]]) -> Mesh2:
@@ -97,7 +97,7 @@ class Mesh3:
     @staticmethod
     def box(counts: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], lengths: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], diagonal: Diagonal) -> Mesh3:
         """
-        Box of counts[a] bricks along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
+        Box of counts[a] cells along axis a, each cut along `diagonal`; parts left, right, bottom, top (front, back).
         """
     @staticmethod
     def from_lists(nodes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], cells: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 4]"], parts: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"]]) -> Mesh3:
@@ -124,9 +124,9 @@ class Mesh3:
         """
 class NormalCompliance:
     """
-    p_nu(r) = min(stiffness max(r, 0)^exponent, most) (2.8).
+    p_nu(r) = min(stiffness max(r, 0)^exponent, pressure_limit) (2.8).
     """
-    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex, exponent: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[float], collections.abc.Sequence[float]] | None) -> None:
+    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex, exponent: typing.SupportsFloat | typing.SupportsIndex, pressure_limit: typing.SupportsFloat | typing.SupportsIndex, custom: collections.abc.Callable[[float], collections.abc.Sequence[float]] | None) -> None:
         """
         `custom`, when not None, takes its place: r > 0 to (pressure, derivative, energy).
         """
@@ -160,9 +160,9 @@ class ContactPart:
     """
     One part of Gamma_C; without a law it only exchanges heat.
     """
-    def __init__(self, *, part: str, law: ContactLaw | None, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex, per_pressure: typing.SupportsFloat | typing.SupportsIndex, friction_share: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def __init__(self, *, part: str, law: ContactLaw | None, quadrature: typing.SupportsInt | typing.SupportsIndex, conductance: typing.SupportsFloat | typing.SupportsIndex, per_pressure: typing.SupportsFloat | typing.SupportsIndex, share: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
-        quadrature 0 is nodal, n Gauss's with n points; q . nu = (conductance + per_pressure p_nu) (theta - theta_F) - friction_share |sigma_tau . w_tau|.
+        quadrature 0 is nodal, n Gauss's with n points; q . nu = (conductance + per_pressure p_nu) (theta - theta_F) - share |sigma_tau . w_tau|.
         """
     @property
     def law(self) -> ContactLaw | None:
@@ -211,9 +211,9 @@ class Problem2:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
+    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
         """
-        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
+        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
         """
     @property
     def conducts(self) -> bool:
@@ -280,9 +280,9 @@ class Problem3:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], clamped: collections.abc.Sequence[str], cooled: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
+    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
         """
-        `regions` is the material of every cell, or empty; `clamped` and `cooled` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
+        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
         """
     @property
     def conducts(self) -> bool:
@@ -362,7 +362,7 @@ class Operators2:
     def __init__(self, layout: Layout2, problem: Problem2) -> None:
         ...
     @property
-    def clamped(self) -> list[int]:
+    def prescribed_displacement(self) -> list[int]:
         """
         Global scalar indices with u = 0 owned by this rank.
         """
@@ -372,7 +372,7 @@ class Operators2:
         d(theta, eta), times the capacity
         """
     @property
-    def cooled(self) -> list[int]:
+    def prescribed_temperature(self) -> list[int]:
         """
         Global nodes with theta = 0 owned by this rank.
         """
@@ -528,7 +528,7 @@ class Operators3:
     def __init__(self, layout: Layout3, problem: Problem3) -> None:
         ...
     @property
-    def clamped(self) -> list[int]:
+    def prescribed_displacement(self) -> list[int]:
         """
         Global scalar indices with u = 0 owned by this rank.
         """
@@ -538,7 +538,7 @@ class Operators3:
         d(theta, eta)
         """
     @property
-    def cooled(self) -> list[int]:
+    def prescribed_temperature(self) -> list[int]:
         """
         Global nodes with theta = 0 owned by this rank.
         """
@@ -839,13 +839,13 @@ class Outcome:
     """
     Members:
     
-      right
+      completed
     
       contact_not_converged
     
       not_finite
     
-      identity_violated
+      balance_violated
     
       precision_lost
     
@@ -855,10 +855,10 @@ class Outcome:
     """
     __members__: typing.ClassVar[dict[str, Outcome]]
     contact_not_converged: typing.ClassVar[Outcome]
-    identity_violated: typing.ClassVar[Outcome]
+    balance_violated: typing.ClassVar[Outcome]
     not_finite: typing.ClassVar[Outcome]
     precision_lost: typing.ClassVar[Outcome]
-    right: typing.ClassVar[Outcome]
+    completed: typing.ClassVar[Outcome]
     solver_failed: typing.ClassVar[Outcome]
     unsupported: typing.ClassVar[Outcome]
     @typing.overload
@@ -905,13 +905,13 @@ class Stage:
     
       restart
     
-      fixed_point
+      tresca_fixed_point
     
       enumeration
     """
     __members__: typing.ClassVar[dict[str, Stage]]
     enumeration: typing.ClassVar[Stage]
-    fixed_point: typing.ClassVar[Stage]
+    tresca_fixed_point: typing.ClassVar[Stage]
     newton: typing.ClassVar[Stage]
     none: typing.ClassVar[Stage]
     restart: typing.ClassVar[Stage]
@@ -976,7 +976,7 @@ class ContactOptions:
     @tolerance.setter
     def tolerance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
-class Ledger:
+class Balances:
     """
     Terms and relative residuals of the balances of one step.
     """
@@ -1045,7 +1045,7 @@ class Ledger:
     def heating(self) -> float:
         ...
     @property
-    def held(self) -> float:
+    def support_heat(self) -> float:
         ...
     @property
     def inertia_damping(self) -> float:
@@ -1075,9 +1075,9 @@ class Cost:
     """
     What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
     """
-    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'books_seconds', 'steps', 'refinements', 'estimates', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
+    items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'balance_seconds', 'steps', 'refinements', 'estimates', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
     @property
-    def books_seconds(self) -> float:
+    def balance_seconds(self) -> float:
         ...
     @property
     def contact_seconds(self) -> float:
@@ -1138,7 +1138,7 @@ class StepReport2:
         its tangential part, (d)
         """
     @property
-    def ledger(self) -> Ledger:
+    def balances(self) -> Balances:
         ...
     @property
     def max_penetration(self) -> float:
@@ -1162,7 +1162,7 @@ class StepReport2:
     @property
     def reason(self) -> str:
         """
-        of an outcome that is not right, in words
+        of a step that was rejected, in words
         """
     @property
     def slip(self) -> int:
@@ -1186,13 +1186,13 @@ class Stepper2:
         ...
     def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport2:
         """
-        One step; the state stays when the outcome is not right. See StepLoads.
+        One step; the state stays when the outcome is not completed. See StepLoads.
         """
     def part(self, strained: petsc4py.PETSc.Vec, strained_w: petsc4py.PETSc.Vec, rigid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
         """
-    def forget(self) -> None:
+    def clear_cache(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
@@ -1321,7 +1321,7 @@ class StepReport3:
         its tangential part, (d)
         """
     @property
-    def ledger(self) -> Ledger:
+    def balances(self) -> Balances:
         ...
     @property
     def max_penetration(self) -> float:
@@ -1345,7 +1345,7 @@ class StepReport3:
     @property
     def reason(self) -> str:
         """
-        of an outcome that is not right, in words
+        of a step that was rejected, in words
         """
     @property
     def slip(self) -> int:
@@ -1369,13 +1369,13 @@ class Stepper3:
         ...
     def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport3:
         """
-        One step; the state stays when the outcome is not right. See StepLoads.
+        One step; the state stays when the outcome is not completed. See StepLoads.
         """
     def part(self, strained: petsc4py.PETSc.Vec, strained_w: petsc4py.PETSc.Vec, rigid: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
         """
         After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
         """
-    def forget(self) -> None:
+    def clear_cache(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
@@ -1487,12 +1487,12 @@ class Stepper3:
 @typing.overload
 def heat_matrix(operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
-    M / k + D + J, cooled.
+    M / k + D + J with prescribed temperatures eliminated.
     """
 @typing.overload
 def heat_matrix(operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
-    M / k + D + J, cooled.
+    M / k + D + J with prescribed temperatures eliminated.
     """
 @typing.overload
 def largest_strain(mesh: Mesh2, u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> float:
@@ -1507,12 +1507,12 @@ def largest_strain(mesh: Mesh3, u: typing.Annotated[numpy.typing.ArrayLike, nump
 @typing.overload
 def momentum_matrix(layout: Layout2, problem: Problem2, operators: Operators2, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
-    rho M / k + B + k A, clamped.
+    rho M / k + B + k A with prescribed displacements eliminated.
     """
 @typing.overload
 def momentum_matrix(layout: Layout3, problem: Problem3, operators: Operators3, k: typing.SupportsFloat | typing.SupportsIndex) -> petsc4py.PETSc.Mat:
     """
-    rho M / k + B + k A, clamped.
+    rho M / k + B + k A with prescribed displacements eliminated.
     """
 @typing.overload
 def prolongation(coarse: Mesh2, fine: Mesh2) -> scipy.sparse.csr_matrix:

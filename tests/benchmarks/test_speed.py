@@ -32,8 +32,8 @@ def scene(n: int, steps: int | None = None, **keys: Any) -> Scene:
     return warmslip.load("paper_mixed").override(**values | {k.replace("__", "."): v for k, v in keys.items()})
 
 
-def norms(job: Simulation) -> dict[str, float]:
-    found = summary(job)["norms"]
+def norms(simulation: Simulation) -> dict[str, float]:
+    found = summary(simulation)["norms"]
     return {name: found[name] for name in NORMS}
 
 
@@ -41,53 +41,53 @@ def norms(job: Simulation) -> dict[str, float]:
 def _say(benchmark: Benchmark, capsys: pytest.CaptureFixture[str]) -> Callable[..., None]:
     """Keeps facts with the benchmark and prints them past pytest's capture."""
 
-    def say(**facts: Any) -> None:
+    def warn(**facts: Any) -> None:
         benchmark.extra_info.update(facts)
         with capsys.disabled():
             for key, value in facts.items():
                 print(f"\n    {key.replace('_', ' ')}: {value:.4g}", end="")
 
-    return say
+    return warn
 
 
-def step_to(job: Simulation) -> None:
-    for _ in job.steps():
+def step_to(simulation: Simulation) -> None:
+    for _ in simulation.steps():
         pass
-    assert job.outcome == "right"
-    assert max(job.statistics.residuals.values()) <= 1e-11
+    assert simulation.outcome == "completed"
+    assert max(simulation.statistics.residuals.values()) <= 1e-11
 
 
-def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
+def test_reference_run(benchmark: Benchmark, warn: Callable[..., None]) -> None:
     """h = k = 1/n, n = 256 unless WARMSLIP_BENCH_N says otherwise: a step against one substitution with both factors."""
     n = int(os.environ.get("WARMSLIP_BENCH_N", "256"))
     pairs: list[float] = []
 
     def reference() -> Simulation:
         start = time.process_time()
-        job = Simulation(scene(n))
-        s, d = job.stepper, job.discretisation
+        simulation = Simulation(scene(n))
+        s, d = simulation.stepper, simulation.discretisation
         right, heat = d.layout.vector(2), d.layout.vector(1)
         x, theta = right.duplicate(), heat.duplicate()
         right.setRandom()
         heat.setRandom()
         every = max(1, n // 32)
         substituting = 0.0
-        for number, _ in enumerate(job.steps()):
+        for number, _ in enumerate(simulation.steps()):
             if number % every == 0:
                 clock = time.process_time()
                 s.momentum_factor.solve(right, x)
                 s.heat_factor.solve(heat, theta)
                 pairs.append(time.process_time() - clock)
                 substituting += pairs[-1]
-        assert job.outcome == "right"
+        assert simulation.outcome == "completed"
         benchmark.extra_info["cpu_seconds"] = time.process_time() - start - substituting
-        return job
+        return simulation
 
-    job = benchmark.pedantic(reference, rounds=1, iterations=1)
-    cost = job.stepper.cost
+    simulation = benchmark.pedantic(reference, rounds=1, iterations=1)
+    cost = simulation.stepper.cost
     substitution = statistics.median(pairs)
-    say(
-        unknowns=job.discretisation.unknowns,
+    warn(
+        unknowns=simulation.discretisation.unknowns,
         milliseconds_a_step=1e3 * cost.step_seconds / cost.steps,
         milliseconds_a_substitution=1e3 * substitution,
         step_over_substitution=cost.step_seconds / cost.steps / substitution,
@@ -98,14 +98,14 @@ def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
         factor_MiB=cost.factor_bytes / 2**20,
         newton_iterations=cost.newton_iterations,
     )
-    assert max(job.statistics.residuals.values()) <= 1e-11
+    assert max(simulation.statistics.residuals.values()) <= 1e-11
     if n in STORED:
-        assert list(norms(job).values()) == pytest.approx(STORED[n], rel=1e-9)
+        assert list(norms(simulation).values()) == pytest.approx(STORED[n], rel=1e-9)
     else:
-        pytest.skip(f"no stored norms for n = {n}: {tuple(norms(job).values())}")
+        pytest.skip(f"no stored norms for n = {n}: {tuple(norms(simulation).values())}")
 
 
-def test_step_against_scipy(benchmark: Benchmark, say: Callable[..., None]) -> None:
+def test_step_against_scipy(benchmark: Benchmark, warn: Callable[..., None]) -> None:
     """The time loops of this core and of the SciPy scheme at h = 1/128, interleaved; the same answer.
 
     SciPy's loop is written twice: plainly (factored once, two solves a step with K), and with K^-1 P stored as a dense
@@ -115,23 +115,23 @@ def test_step_against_scipy(benchmark: Benchmark, say: Callable[..., None]) -> N
     seconds: dict[str, list[float]] = {"ours": [], "plain": [], "stored": []}
 
     def alternate() -> tuple[Simulation, list[Any]]:
-        job = Simulation(scene(n, steps))
-        step_to(job)
-        seconds["ours"].append(job.stepper.cost.step_seconds)
+        simulation = Simulation(scene(n, steps))
+        step_to(simulation)
+        seconds["ours"].append(simulation.stepper.cost.step_seconds)
         results = [scipy_scheme.simulate("mixed", 10.0, n, steps, keep="final", store=store) for store in (False, True)]
         for name, result in zip(("plain", "stored"), results, strict=True):
             seconds[name].append(result.seconds_loop)
-        return job, results
+        return simulation, results
 
-    job, results = benchmark.pedantic(alternate, rounds=3, iterations=1)
+    simulation, results = benchmark.pedantic(alternate, rounds=3, iterations=1)
     for result in results:
         expected = scipy_scheme.norms(n, result.u[-1], result.w[-1], result.theta[-1])
-        assert norms(job) == pytest.approx(expected, rel=1e-9)
+        assert norms(simulation) == pytest.approx(expected, rel=1e-9)
 
     def faster(than: str) -> float:
         return statistics.median(b / a for a, b in zip(seconds["ours"], seconds[than], strict=True))
 
-    say(
+    warn(
         milliseconds_a_step=1e3 * statistics.median(seconds["ours"]) / steps,
         milliseconds_a_step_with_SciPy=1e3 * statistics.median(seconds["plain"]) / steps,
         milliseconds_a_step_with_SciPy_and_a_stored_matrix=1e3 * statistics.median(seconds["stored"]) / steps,
@@ -146,21 +146,21 @@ def test_step_against_scipy(benchmark: Benchmark, say: Callable[..., None]) -> N
     [({}, {"contact__quadrature": "gauss-2"}), ({}, {"time__coupling": "monolithic"})],
     ids=["nodal, gauss-2", "staggered, monolithic"],
 )
-def test_choices(benchmark: Benchmark, say: Callable[..., None], base: dict[str, Any], other: dict[str, Any]) -> None:
+def test_choices(benchmark: Benchmark, warn: Callable[..., None], base: dict[str, Any], other: dict[str, Any]) -> None:
     """What a choice costs a step at h = k = 1/64."""
     seconds: tuple[list[float], list[float]] = ([], [])
 
     def alternate() -> list[Simulation]:
-        jobs = [Simulation(scene(64, **keys)) for keys in (base, other)]
-        for job, times in zip(jobs, seconds, strict=True):
-            step_to(job)
-            times.append(job.stepper.cost.step_seconds / job.stepper.cost.steps)
-        return jobs
+        simulations = [Simulation(scene(64, **keys)) for keys in (base, other)]
+        for simulation, times in zip(simulations, seconds, strict=True):
+            step_to(simulation)
+            times.append(simulation.stepper.cost.step_seconds / simulation.stepper.cost.steps)
+        return simulations
 
-    jobs = benchmark.pedantic(alternate, rounds=3, iterations=1)
-    assert list(norms(jobs[0]).values()) == pytest.approx(STORED[64], rel=1e-9)
-    near = np.array(list(norms(jobs[1]).values())) / np.array(STORED[64])
+    simulations = benchmark.pedantic(alternate, rounds=3, iterations=1)
+    assert list(norms(simulations[0]).values()) == pytest.approx(STORED[64], rel=1e-9)
+    near = np.array(list(norms(simulations[1]).values())) / np.array(STORED[64])
     assert np.abs(near - 1).max() < 0.05  # another scheme, the same problem
     assert (near != 1).any()
     first, second = (statistics.median(times) for times in seconds)
-    say(milliseconds_a_step=1e3 * first, milliseconds_a_step_of_the_other=1e3 * second, ratio=second / first)
+    warn(milliseconds_a_step=1e3 * first, milliseconds_a_step_of_the_other=1e3 * second, ratio=second / first)

@@ -278,7 +278,7 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
     errors = it.apart(mine, fields, scales)
     clean = max(errors.values()) <= TOLERANCE
     spread: dict[str, float] = {}
-    if ran.outcome != "right" or not clean:
+    if ran.outcome != "completed" or not clean:
         if not clean:
             other = it.another()
             again = it.fields(other)
@@ -288,7 +288,7 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
                 clean = max(errors.values()) <= TOLERANCE
         spread = it.spread(reference, fields, scales)
     held = max(spread.values(), default=0.0) <= HELD
-    if ran.outcome != "right":
+    if ran.outcome != "completed":
         row["rounding"] = it.rounding(reference, scales)
         held = held and row["rounding"] <= TOLERANCE
         row["class"] = "stopped_though_solvable" if held else "ill_posed_and_said"
@@ -296,8 +296,8 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
         row["class"] = "right"
     else:
         near = all(errors[name] <= max(TOLERANCE, DATA * spread[name]) for name in FIELDS)
-        said = all(errors[name] <= stated(ran, name) for name in FIELDS)
-        row["class"] = "ill_posed_unsaid" if near else "right_as_stated" if said else "silently_wrong"
+        message = all(errors[name] <= stated(ran, name) for name in FIELDS)
+        row["class"] = "ill_posed_unsaid" if near else "right_as_stated" if message else "silently_wrong"
     left = [it.scheme.left_over(a, b, n) for n, (a, b) in enumerate(itertools.pairwise(own), 1)]
     row |= {f"left_{name}": max((one[name] for one in left), default="") for name in LEFT}
     row |= {f"error_{name}": errors[name] for name in FIELDS} | {f"spread_{name}": v for name, v in spread.items()}

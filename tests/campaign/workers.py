@@ -15,8 +15,8 @@ START = 60.0  # seconds a new process has to say that it is there
 
 def _serve(pipe: Connection, work: Callable[[Any, Callable[[Any], None]], Any]) -> None:
     pipe.send(("ready", None))
-    while (job := pipe.recv()) is not None:
-        pipe.send(("done", work(job, lambda half: pipe.send(("half", half)))))
+    while (simulation := pipe.recv()) is not None:
+        pipe.send(("done", work(simulation, lambda half: pipe.send(("half", half)))))
 
 
 class _Worker:
@@ -33,11 +33,11 @@ class _Worker:
         self.until = time.monotonic() + START
         self.ready = False
 
-    def give(self, job: Any, limit: float) -> None:
-        self.job, self.half = job, None
+    def give(self, simulation: Any, limit: float) -> None:
+        self.job, self.half = simulation, None
         if self.ready:
             self.until = time.monotonic() + limit
-        self.pipe.send(job)
+        self.pipe.send(simulation)
 
     def end(self) -> None:
         self.process.kill()
@@ -46,19 +46,19 @@ class _Worker:
 
 
 def served(
-    work: Callable[[Any, Callable[[Any], None]], Any], jobs: Iterable[Any], *, processes: int, limit: float
+    work: Callable[[Any, Callable[[Any], None]], Any], simulations: Iterable[Any], *, processes: int, limit: float
 ) -> Iterator[tuple[Any, str, Any]]:
     """(job, how, result) as they come. `work(job, tell)` may tell half of its result on the way.
 
     how: `done`; `crash` where the process died, `hang` after `limit` seconds, the result then being what was told, or None.
     """
-    left, workers = iter(jobs), [_Worker(work) for _ in range(processes)]
+    left, workers = iter(simulations), [_Worker(work) for _ in range(processes)]
     busy: list[_Worker] = []
 
     def feed(worker: _Worker) -> None:
-        job = next(left, None)
-        if job is not None:
-            worker.give(job, limit)
+        simulation = next(left, None)
+        if simulation is not None:
+            worker.give(simulation, limit)
             busy.append(worker)
 
     try:
@@ -92,12 +92,12 @@ def served(
             worker.end()
 
 
-def rehearse(job: str, tell: Callable[[Any], None]) -> str:
+def rehearse(simulation: str, tell: Callable[[Any], None]) -> str:
     """Work that goes wrong when told to, for the tests: `die`, `sleep`, `half` and sleep; anything else comes back."""
-    if job == "die":
+    if simulation == "die":
         os.kill(os.getpid(), signal.SIGKILL)
-    if job == "half":
-        tell(job)
-    if job in ("die", "half", "sleep"):
+    if simulation == "half":
+        tell(simulation)
+    if simulation in ("die", "half", "sleep"):
         time.sleep(100)
-    return job
+    return simulation

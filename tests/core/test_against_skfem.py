@@ -14,7 +14,7 @@ import pytest
 from reference import scipy_scheme, skfem_scheme
 
 import warmslip
-from warmslip.verification.check import Line, near
+from warmslip.records.check import Check, near
 
 Numbers = dict[str, float]
 Code = Callable[[str, float, int, int, str], Numbers]
@@ -33,7 +33,7 @@ def core(reading: str, theta_F: float, n: int, steps: int, coupling: str, **more
         "contact.heat_exchange.foundation_temperature": theta_F,
     }
     result = warmslip.run(warmslip.load(f"paper_{reading}").override(**keys | more))
-    assert result.right
+    assert result.completed
     traction = result.summary["contact"]["traction"]
     return result.summary["norms"] | {"traction_x": traction[0], "traction_y": traction[1]}
 
@@ -50,13 +50,13 @@ reference = cache(lambda code, *case: CODES[code](*case))
 ours = cache(core)
 
 
-def lines(code: str, reading: str, theta_F: float, coupling: str) -> list[Line]:
+def lines(code: str, reading: str, theta_F: float, coupling: str) -> list[Check]:
     """Every number of the core against the code's, one line each."""
     case = reading, theta_F, N, STEPS, coupling
     return compare(f"{code}/{reading}, theta_F = {theta_F:g}, {coupling}", reference(code, *case), ours(*case))
 
 
-def compare(case: str, expected: Numbers, observed: Numbers) -> list[Line]:
+def compare(case: str, expected: Numbers, observed: Numbers) -> list[Check]:
     force = float(np.hypot(expected["traction_x"], expected["traction_y"]))
     scales = dict.fromkeys(("traction_x", "traction_y"), force)
     return [

@@ -45,9 +45,9 @@ def column(d: int, r: float, k: float, steps: int, **keys: Any) -> Scene:
     )
 
 
-def said(job: Simulation) -> str:
+def message(simulation: Simulation) -> str:
     """What the summary says of growth, nothing where it says nothing."""
-    return " ".join(one for one in summary(job)["warnings"] if one.startswith(FED))
+    return " ".join(one for one in summary(simulation)["warnings"] if one.startswith(FED))
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_growth_of_the_staggered_coupling(d: int, r: float, k: float, grows: boo
     For R = -M it grows beyond k = 2 A/(M^2 - F) by the splitting. For R = +M it grows beyond M R = F, as the equations do.
     """
     steps, speeds = 200, []
-    right(column(d, r, k, steps), each=lambda job, report: speeds.append(float(field(job, "w")[0, -1])))
+    right(column(d, r, k, steps), each=lambda simulation, report: speeds.append(float(field(simulation, "w")[0, -1])))
     factor = 1 + k * (M * r - F) / (A + k * F)
     assert (abs(factor) > 1) == grows
     assert speeds[-1] / speeds[0] == pytest.approx(factor ** (steps - 1), rel=1e-9)
@@ -91,7 +91,7 @@ SMALL = 1e-5  # the growth is of no size that anything else would see
 def test_growth_is_said(d: int, coupling: str, r: float, k: float, steps: int, cure: str) -> None:
     """Two per cent outside the limit, with the factor a step that the equations have, and what helps."""
     one = column(d, r, k, steps, coupling=coupling, theta=SMALL)
-    words = said(right(one, digits=7.0))
+    words = message(right(one, digits=7.0))
     strained = k * (M * r - F)
     factor = {
         "staggered": abs(1 + strained / (A + k * F)),
@@ -141,24 +141,26 @@ def test_what_is_driven_does_not_grow(d: int, coupling: str, r: float, k: float,
         return along(d, formula) if name in ("body", "top") else formula
 
     inertia = {"inertia": {"density": 1.0}} if keys else {}
-    job = Simulation(column(d, r, k, 300, coupling=coupling, theta=SMALL, **inertia, **filled(keys)))
-    for _ in job.steps():
+    simulation = Simulation(column(d, r, k, 300, coupling=coupling, theta=SMALL, **inertia, **filled(keys)))
+    for _ in simulation.steps():
         pass
-    assert said(job) == ""
+    assert message(simulation) == ""
 
 
 @pytest.mark.parametrize(
     ("r", "k", "coupling"), [(-M, 10 * LIMIT, "staggered"), (M, 1.0, "lagged"), (M, 0.05, "monolithic")]
 )
 def test_growth_until_numbers_overflow_is_the_reason(d: int, r: float, k: float, coupling: str) -> None:
-    job = Simulation(column(d, r, k, 3000, coupling=coupling))
-    for _ in job.steps():
+    simulation = Simulation(column(d, r, k, 3000, coupling=coupling))
+    for _ in simulation.steps():
         pass
-    assert job.outcome == "not_finite" and job.failure is not None
-    assert job.failure["reason"].startswith(FED) and job.failure["reason"].endswith("; in the end a number overflowed")
+    assert simulation.outcome == "not_finite" and simulation.failure is not None
+    assert simulation.failure["reason"].startswith(FED) and simulation.failure["reason"].endswith(
+        "; in the end a number overflowed"
+    )
 
 
 def test_a_growth_ends_where_the_step_is_cured(d: int) -> None:
     """What the sentence advises: the very run, monolithic or in steps below the number that it says."""
     for coupling, k in (("monolithic", 1.02 * LIMIT), ("staggered", 0.99 * LIMIT)):
-        assert said(right(column(d, -M, k, 300, coupling=coupling, theta=SMALL))) == ""
+        assert message(right(column(d, -M, k, 300, coupling=coupling, theta=SMALL))) == ""

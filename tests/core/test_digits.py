@@ -19,7 +19,7 @@ check = Checks()
 
 def carried(d: int, speed: float, **keys: Any) -> Simulation:
     """A warm body under a load, on a support that moves with it: nothing but its place depends on the speed."""
-    job = Simulation(
+    simulation = Simulation(
         scene(
             d,
             3 if d == 2 else 2,
@@ -37,10 +37,10 @@ def carried(d: int, speed: float, **keys: Any) -> Simulation:
             loads={"traction": {"right": ["sin(3*t)"] + [0.3] * (d - 1)}},
         )
     )
-    for _ in job.steps():
+    for _ in simulation.steps():
         pass
-    assert job.outcome == "right", job.failure
-    return job
+    assert simulation.outcome == "completed", simulation.failure
+    return simulation
 
 
 @check
@@ -49,13 +49,13 @@ def rounding_of_a_fast_motion(d: int) -> None:
     for coupling in ("staggered", "lagged", "monolithic"):
         still = field(carried(d, 0.0, coupling=coupling), "theta")
         for speed in (1e4, 1e6, 1e8, 1e10, 1e12):
-            job = carried(d, speed, coupling=coupling)
-            stated, said = summary(job)["digits"], summary(job)["warnings"]
-            error = np.abs(field(job, "theta") - still).max() / np.abs(still).max()
+            simulation = carried(d, speed, coupling=coupling)
+            stated, message = summary(simulation)["digits"], summary(simulation)["warnings"]
+            error = np.abs(field(simulation, "theta") - still).max() / np.abs(still).max()
             assert error <= 10 ** (1 - stated["theta"]), (coupling, speed, error, stated)
             assert stated["theta"] <= 1 - np.log10(speed * 1e-16 / np.abs(still).max())
             for name, words in (("theta", "the temperature keeps"), ("stress", "the stress keeps")):
-                assert any(words in one for one in said) == (stated[name] < 4), (name, said)
+                assert any(words in one for one in message) == (stated[name] < 4), (name, message)
 
 
 @check
@@ -63,7 +63,7 @@ def rounding_of_a_motion_that_is_over(d: int) -> None:
     """A support leaps away and comes back in between: the temperature has kept what rounding made of the way."""
 
     def leaps(way: float, coupling: str) -> Simulation:
-        job = Simulation(
+        simulation = Simulation(
             scene(
                 d,
                 3 if d == 2 else 2,
@@ -79,17 +79,17 @@ def rounding_of_a_motion_that_is_over(d: int) -> None:
                 loads={"traction": {"right": ["sin(3*t)"] + [0.3] * (d - 1)}},
             )
         )
-        for _ in job.steps():
+        for _ in simulation.steps():
             pass
-        assert job.outcome == "right", job.failure
-        return job
+        assert simulation.outcome == "completed", simulation.failure
+        return simulation
 
     for coupling in ("staggered", "lagged"):
         still = field(leaps(0.0, coupling), "theta")
         for way in (1e6, 1e9, 1e12):
-            job = leaps(way, coupling)
-            error = np.abs(field(job, "theta") - still).max() / np.abs(still).max()
-            assert error <= 10 ** (1 - summary(job)["digits"]["theta"]), (coupling, way, error)
+            simulation = leaps(way, coupling)
+            error = np.abs(field(simulation, "theta") - still).max() / np.abs(still).max()
+            assert error <= 10 ** (1 - summary(simulation)["digits"]["theta"]), (coupling, way, error)
 
 
 @check
@@ -98,7 +98,7 @@ def friction_heat_of_a_light_touch(d: int) -> None:
 
     def pulled(load: float) -> Simulation:
         sides = {"right": along(d, 0.0, load), "left": along(d, 0.0, -load)}
-        job = Simulation(
+        simulation = Simulation(
             scene(
                 d,
                 3 if d == 2 else 2,
@@ -116,9 +116,9 @@ def friction_heat_of_a_light_touch(d: int) -> None:
                 },
             )
         )
-        for _ in job.steps():
+        for _ in simulation.steps():
             pass
-        return job
+        return simulation
 
     gap, below, above = 0.5, -1.0, 2.0
     for _ in range(40):
@@ -127,7 +127,7 @@ def friction_heat_of_a_light_touch(d: int) -> None:
         below, above = (gap, above) if touches else (below, gap)
     gap = below - 1e-9
     one, other = pulled(1.0), pulled(1.0 + 2.3e-16)
-    assert one.outcome == other.outcome == "right", (one.failure, other.failure)
+    assert one.outcome == other.outcome == "completed", (one.failure, other.failure)
     size = np.abs(field(one, "theta")).max()
     change = np.abs(field(one, "theta") - field(other, "theta")).max() / size
     stated = summary(one)["digits"]
@@ -137,7 +137,7 @@ def friction_heat_of_a_light_touch(d: int) -> None:
 
 def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: Any) -> Simulation:
     """A steel block rests by its weight on a foundation that cools it, without inertia: it shrinks over all points."""
-    job = Simulation(
+    simulation = Simulation(
         scene(
             d,
             1 if d == 2 else 2,
@@ -156,34 +156,34 @@ def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: A
             | contact,
         )
     )
-    for _, report in job.steps():
+    for _, report in simulation.steps():
         assert not report.undetermined or report.stick == 0
-    assert job.outcome == "right", job.failure
-    np.testing.assert_allclose(job.report.normal_force, 76518.0 * 0.1**d, rtol=1e-10)
-    return job
+    assert simulation.outcome == "completed", simulation.failure
+    np.testing.assert_allclose(simulation.report.normal_force, 76518.0 * 0.1**d, rtol=1e-10)
+    return simulation
 
 
-def unplaced(job: Simulation) -> bool:
-    return any("do not determine where the body is" in words for words in summary(job)["warnings"])
+def unplaced(simulation: Simulation) -> bool:
+    return any("do not determine where the body is" in words for words in summary(simulation)["warnings"])
 
 
 @check
 def a_place_that_no_force_determines(d: int) -> None:
     """Two points that slip towards each other hold a body wherever it lies between; many in the plane know where."""
     for coupling in ("staggered", "monolithic"):
-        job = cooling(d, coupling)
-        digits = summary(job)["digits"]
-        assert unplaced(job) == (d == 2)
+        simulation = cooling(d, coupling)
+        digits = summary(simulation)["digits"]
+        assert unplaced(simulation) == (d == 2)
         assert digits["u"] == 0 if d == 2 else digits["u"] > 8
     if d == 3:
         return
     # where it is undetermined in steps alone whose digits nobody estimates
     push = "where(t<150,2e4,where(t>550,2e4,where(abs(t-300)<50,2e4,0)))"
-    job = cooling(d, "staggered", steps=6, push=push)
-    assert unplaced(job) and summary(job)["digits"]["u"] == 0
-    assert summary(job)["digits"]["theta"] > 8
-    job = cooling(d, "staggered", friction_heating={"share": 1.0})
-    assert unplaced(job) and summary(job)["digits"]["theta"] == 0
+    simulation = cooling(d, "staggered", steps=6, push=push)
+    assert unplaced(simulation) and summary(simulation)["digits"]["u"] == 0
+    assert summary(simulation)["digits"]["theta"] > 8
+    simulation = cooling(d, "staggered", friction_heating={"share": 1.0})
+    assert unplaced(simulation) and summary(simulation)["digits"]["theta"] == 0
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

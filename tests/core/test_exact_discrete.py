@@ -14,8 +14,8 @@ from reference.exact_cases import CASES, COUPLINGS, CYCLES, SEVERAL, SOLID, Case
 from reference.exact_numbers import floats, zeros
 from reference.exact_scheme import DIGITS, OPEN, SLIP, STICK, Scheme, State
 
+from warmslip.records.check import Check, below
 from warmslip.simulation.simulation import Simulation
-from warmslip.verification.check import Line, below
 
 ROUND_OFF = 1e-12  # relative to the largest entry of each field
 
@@ -26,23 +26,23 @@ def relative(observed: Any, expected: Any) -> float:
     return float(np.abs(observed - expected).max() / (np.abs(expected).max() or 1.0))
 
 
-def order(job: Simulation, scheme: Scheme) -> list[int]:
+def order(simulation: Simulation, scheme: Scheme) -> list[int]:
     """The core's number of each contact point of the scheme."""
-    surface = job.discretisation.surface
+    surface = simulation.discretisation.surface
     ours = np.hstack([surface.positions, surface.normals])
     theirs = floats([[*p.position, *p.normal] for p in scheme.points])
     return [int(np.abs(ours - x).sum(axis=1).argmin()) for x in theirs]
 
 
-def lines(case: str, scheme: Scheme, job: Simulation, state: State) -> list[Line]:
+def lines(case: str, scheme: Scheme, simulation: Simulation, state: State) -> list[Check]:
     """The core's state against the exact one. Forces by node: Gauss points in stick may share one in many ways."""
-    at, d = order(job, scheme), job.discretisation
-    force = np.asarray(job.stepper.contact_force).reshape(-1, scheme.d)[at]
+    at, d = order(simulation, scheme), simulation.discretisation
+    force = np.asarray(simulation.stepper.contact_force).reshape(-1, scheme.d)[at]
     normals, shapes = floats([p.normal for p in scheme.points]), floats([p.shape for p in scheme.points])
     normal = np.array([x @ p.normal for x, p in zip(state.force, scheme.points, strict=True)])
     nodal = np.array([p.shape for p in scheme.points]).T @ state.force
     observed = {
-        name: relative(d.field(getattr(job.stepper, name)), getattr(state, name)) for name in ("u", "w", "theta")
+        name: relative(d.field(getattr(simulation.stepper, name)), getattr(state, name)) for name in ("u", "w", "theta")
     }
     observed["nodal contact force"] = relative(shapes.T @ force, nodal)
     observed["pressure"] = relative((force * normals).sum(axis=1), normal)
@@ -52,22 +52,24 @@ def lines(case: str, scheme: Scheme, job: Simulation, state: State) -> list[Line
     ]
 
 
-def march(name: str, case: Case) -> tuple[list[Line], list[str]]:
+def march(name: str, case: Case) -> tuple[list[Check], list[str]]:
     """Both codes side by side: the lines of all steps and the stages of the core's contact solver."""
-    scheme, job, found, stages = case.scheme, case.run(), [], []
-    reports = (report for _, report in job.steps())
+    scheme, simulation, found, stages = case.scheme, case.run(), [], []
+    reports = (report for _, report in simulation.steps())
     for n, state in enumerate(case.states[1:], 1):
         assert state.solutions == 1, f"{name}: {state.solutions} solutions in step {n}"
         report = next(reports, None)
-        assert report is not None, f"{name}: the core ended {job.outcome} in step {n}, the answer is {state.status}"
-        found += lines(f"{name}/step {n}", scheme, job, state)
+        assert report is not None, (
+            f"{name}: the core ended {simulation.outcome} in step {n}, the answer is {state.status}"
+        )
+        found += lines(f"{name}/step {n}", scheme, simulation, state)
         if case.scene().contact.quadrature == "nodal":
-            assert [job.stepper.status[i] for i in order(job, scheme)] == list(state.status), name
+            assert [simulation.stepper.status[i] for i in order(simulation, scheme)] == list(state.status), name
         stages.append(report.stage.name)
     return found, stages
 
 
-def check(found: list[Line]) -> None:
+def check(found: list[Check]) -> None:
     wrong = [line for line in found if not line.passed]
     assert not wrong, "\n".join(f"{line.case}: {line.observed:.2g}" for line in wrong)
 
@@ -98,7 +100,7 @@ def test_the_cases_meet_every_status() -> None:
 def directions(scheme: Scheme) -> Iterator[Any]:
     """Unit velocities of either sign of all unknowns that are not held."""
     for a, c, sign in itertools.product(range(scheme.N), range(scheme.d), (1, -1)):
-        if a not in scheme.clamped:
+        if a not in scheme.prescribed_displacement:
             v = zeros(scheme.N, scheme.d)
             v[a, c] = Fraction(sign)
             yield v
@@ -131,11 +133,11 @@ def test_where_newton_once_cycled_it_finds_the_only_answer(name: str) -> None:
 def test_of_several_solutions_the_core_returns_one(name: str) -> None:
     """Coulomb friction with a large coefficient is not unique; then the core's answer is one of the exact ones."""
     count, case = SEVERAL[name]
-    scheme, job = case.scheme, case.run()
+    scheme, simulation = case.scheme, case.run()
     states = scheme.step(scheme.start())
-    next(job.steps())
+    next(simulation.steps())
     assert len(states) == count
-    hits = [state for state in states if all(line.passed for line in lines(name, scheme, job, state))]
+    hits = [state for state in states if all(line.passed for line in lines(name, scheme, simulation, state))]
     assert len(hits) == 1
 
 
@@ -143,20 +145,20 @@ def test_of_several_solutions_the_core_returns_one(name: str) -> None:
 def test_slip_in_any_direction(coupling: str) -> None:
     """Six tetrahedra; the core's statuses, verified: the law and the inequality hold for the answer in 60 digits."""
     case = Case(1, SOLID | {"time.coupling": coupling, "time.steps": 3}, "block_3d")
-    scheme, job = case.scheme, case.run()
+    scheme, simulation = case.scheme, case.run()
     old, statuses = scheme.start(), set()
-    for _ in job.steps():
-        at = order(job, scheme)
-        status = [job.stepper.status[i] for i in at]
-        guess = np.asarray(job.stepper.contact_force).reshape(-1, 3)[at]
+    for _ in simulation.steps():
+        at = order(simulation, scheme)
+        status = [simulation.stepper.status[i] for i in at]
+        guess = np.asarray(simulation.stepper.contact_force).reshape(-1, 3)[at]
         new = scheme.polish(old, status, guess)
-        check(lines(f"cube, {coupling}", scheme, job, new))
+        check(lines(f"cube, {coupling}", scheme, simulation, new))
         assert min(scheme.inequality(old, new, [new.w + v for v in directions(scheme)])) >= -(10.0 ** (20 - DIGITS))
         slips = [x for x, s in zip(floats(new.force), status, strict=True) if s == SLIP]
         assert all(abs(x[0] * x[1]) > 1e-4 * x[2] ** 2 for x in slips)  # along no axis
         statuses |= set(status)
         old = new
-    assert job.outcome == "right"
+    assert simulation.outcome == "completed"
     assert statuses >= {STICK, SLIP}
 
 
@@ -174,13 +176,15 @@ def test_stiffer_than_doubles_resolve(stiffness: float) -> None:
         "loads.body": [0.0, -4.0],
     }
     case = Case(1, keys, "paper_mixed")
-    scheme, job = case.scheme, case.run()
+    scheme, simulation = case.scheme, case.run()
     (state,) = scheme.step(scheme.start())
     lost = 1 + max(
         float(p.weight * scheme.c_nu * scheme.k * scheme.W[2 * q, 2 * q]) for q, p in enumerate(scheme.points)
     )
-    assert next(job.steps(), None)
-    assert all(line.observed <= ROUND_OFF + 8 * np.finfo(float).eps * lost for line in lines("", scheme, job, state))
+    assert next(simulation.steps(), None)
+    assert all(
+        line.observed <= ROUND_OFF + 8 * np.finfo(float).eps * lost for line in lines("", scheme, simulation, state)
+    )
 
 
 @pytest.mark.parametrize(
@@ -213,6 +217,8 @@ def test_stiffer_than_doubles_resolve(stiffness: float) -> None:
 def test_every_constant_matters(key: str, value: Any) -> None:
     """One constant of the core off by one part in a hundred, or another scheme, and it is told from the exact answer."""
     case = CASES["squares, staggered, nodal"]
-    job = case.run(**{key: value})
-    found = [lines(key, case.scheme, job, state) for _, state in zip(job.steps(), case.states[1:], strict=True)]
+    simulation = case.run(**{key: value})
+    found = [
+        lines(key, case.scheme, simulation, state) for _, state in zip(simulation.steps(), case.states[1:], strict=True)
+    ]
     assert max(line.observed for step in found for line in step) > 1e-6

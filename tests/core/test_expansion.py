@@ -49,7 +49,7 @@ def heated(assumption: str = "plane_strain", theta: float = ROOM, reference: flo
 def test_nothing_moves_at_the_reference_temperature(assumption: str, coupling: str) -> None:
     scene = heated(assumption, time__coupling=coupling)
     done = warmslip.run(scene)
-    assert done.right, done.summary["failure"]
+    assert done.completed, done.summary["failure"]
     assert np.abs(done.theta - ROOM).max() <= 1e-11 * ROOM
     scale = ALPHA * ROOM  # displacement without a reference
     assert np.abs(done.u).max() <= 1e-11 * scale
@@ -67,7 +67,7 @@ def test_only_the_difference_counts(coupling: str) -> None:
         scene = heated(theta=origin + 10, reference=origin, time__coupling=coupling)
         scene = scene.override(regions={"stiff": stiff | {"heat": own}, "cold": {"where": "y > 0.5"}})
         done, d = warmslip.run(scene), discretise(scene)
-        assert done.right
+        assert done.completed
         assert [m.reference for m in d.problem.materials] == [origin, origin + 4, origin]
         ends.append((done.u, d.mises_of(done.u, done.w, done.theta)))
     (u, stress), (u_room, stress_room) = ends
@@ -91,7 +91,7 @@ def test_a_free_body_expands_by_alpha(assumption: str) -> None:
     )
     done = warmslip.run(scene)
     d = discretise(scene)
-    assert done.right
+    assert done.completed
     assert np.abs(done.u - stretch * np.asarray(d.mesh.nodes)).max() <= 1e-12
     assert np.abs(d.stress(done.u, done.w, done.theta)).max() <= 1e-10
     along = -YOUNG * ALPHA * 10 if assumption == "plane_strain" else 0.0
@@ -120,7 +120,7 @@ def test_a_stretched_body_cools(given: str) -> None:
         supports__displacement={part: [f"{strain} * x * t / 10", 0.0] for part in ("left", "right", "bottom", "top")},
     )
     done = warmslip.run(scene)
-    assert done.right
+    assert done.completed
     assert done.theta == pytest.approx(ROOM - 0.0243, rel=1e-12)
 
 

@@ -55,8 +55,10 @@ def steel(d: int, n: int, end: float, **tables: Any) -> Scene:
     )
 
 
-def momentum(job: Simulation) -> Any:
-    return job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
+def momentum(simulation: Simulation) -> Any:
+    return simulation.discretisation.field(simulation.discretisation.operators.inertia * simulation.stepper.w).sum(
+        axis=0
+    )
 
 
 @check
@@ -66,7 +68,7 @@ def warm_flight(d: int) -> None:
     for heating in couplings(d):
         for end in (1e-3, 1e4):
             flight = np.asarray(along(d, 10.0, -3.0))
-            job = right(
+            simulation = right(
                 steel(
                     d,
                     4 if d == 2 else 2,
@@ -76,14 +78,14 @@ def warm_flight(d: int) -> None:
                 )
             )
             exact = MASS[d] * flight / end
-            assert np.abs(momentum(job) - exact).max() <= 1e-13 * np.abs(exact).max()
+            assert np.abs(momentum(simulation) - exact).max() <= 1e-13 * np.abs(exact).max()
             if end < 1:
                 continue  # elastic waves have not died away
             strain = EXPANSION / stiffness
             theta = 36.0 / (3.6 - strain * (np.trace(heating) if isinstance(heating, list) else d * heating))
-            x = np.asarray(job.discretisation.mesh.nodes) - 5.0
-            assert np.abs(field(job, "theta") - theta).max() <= 1e-11 * theta
-            assert np.abs(field(job, "u") - flight - strain * theta * x).max() <= 1e-12 * np.abs(flight).max()
+            x = np.asarray(simulation.discretisation.mesh.nodes) - 5.0
+            assert np.abs(field(simulation, "theta") - theta).max() <= 1e-11 * theta
+            assert np.abs(field(simulation, "u") - flight - strain * theta * x).max() <= 1e-12 * np.abs(flight).max()
 
 
 @check
@@ -91,7 +93,7 @@ def warm_and_held_by_contact(d: int) -> None:
     """Statics whatever the coupling, from steps of the waves' transit to some that are a billion times as long."""
     for heating in couplings(d):
         for end in (1e-2, 1.0, 1e4):
-            job = right(
+            simulation = right(
                 steel(
                     d,
                     3,
@@ -101,7 +103,7 @@ def warm_and_held_by_contact(d: int) -> None:
                     contact={"part": "bottom", "stiffness": 1e6, "friction": {"coefficient": 0.2}},
                 )
             )
-            assert job.report.normal_force == pytest.approx(10.0 ** (d - 1), rel=1e-8)
+            assert simulation.report.normal_force == pytest.approx(10.0 ** (d - 1), rel=1e-8)
 
 
 @check
@@ -109,7 +111,7 @@ def strongly_coupled_and_unsymmetric(d: int) -> None:
     """Steps about as long as the waves' transit, in which mass and springs hold the motions alike: momentum stays."""
     strong = (1e3 * np.array(turned(d))).tolist()
     for end in (1e-6, 1e-5, 1e-4):
-        job = right(
+        simulation = right(
             steel(
                 d,
                 3,
@@ -120,9 +122,9 @@ def strongly_coupled_and_unsymmetric(d: int) -> None:
             )
         )
         pushed = 10.0**d * end
-        assert momentum(job)[-1] == pytest.approx(-pushed, rel=1e-10)
-        assert np.abs(momentum(job)[:-1]).max() <= 1e-10 * pushed
-        assert job.stepper.cost.refinements == 0  # which would mend motions of the wrong operator
+        assert momentum(simulation)[-1] == pytest.approx(-pushed, rel=1e-10)
+        assert np.abs(momentum(simulation)[:-1]).max() <= 1e-10 * pushed
+        assert simulation.stepper.cost.refinements == 0  # which would mend motions of the wrong operator
 
 
 @check
@@ -140,8 +142,8 @@ def slides_without_friction(d: int) -> None:
                     initial={"velocity": along(d, 0.0, 1e-5 / end)},
                     contact={"part": "bottom", "stiffness": 1e6, "friction": {"coefficient": 0.0}},
                 )
-                job = right(one.override(**{"time.coupling": coupling}))
-                assert momentum(job)[0] == pytest.approx(MASS[d] * 1e-5 / end, rel=1e-5)
+                simulation = right(one.override(**{"time.coupling": coupling}))
+                assert momentum(simulation)[0] == pytest.approx(MASS[d] * 1e-5 / end, rel=1e-5)
 
 
 @check
@@ -161,12 +163,12 @@ def flight_makes_no_heat(d: int) -> None:
                         heat=heated(d, -1e3, capacity=capacity, conductivity=conductivity),
                         initial={"velocity": velocity},
                     )
-                    job = right(one, digits=4.0)
-                    told = summary(job)
-                    assert told["digits"]["u"] >= 8
-                    said = any("the temperature keeps" in words for words in told["warnings"])
-                    assert said == (told["digits"]["theta"] < 4)
-                    theta = np.abs(field(job, "theta")).max()
+                    simulation = right(one, digits=4.0)
+                    output = summary(simulation)
+                    assert output["digits"]["u"] >= 8
+                    message = any("the temperature keeps" in words for words in output["warnings"])
+                    assert message == (output["digits"]["theta"] < 4)
+                    theta = np.abs(field(simulation, "theta")).max()
                     # 1e-10 of what a strain rate of 1 would heat: below, the core takes a temperature for rounding
                     assert theta <= 1e-10 * 1e3 * end / capacity, (coupling, end, capacity, theta)
 

@@ -80,14 +80,14 @@ def a_run_ends_at_the_step_that_brings_it_inside(d: int) -> None:
         ("t / 50", "0.024 - t / 60", 0.0035),
     ):
         one = held(d, "bottom", "left", inside, gap=gap)
-        job = Simulation(one)
-        taken = len(list(job.steps()))
-        assert job.outcome == "held_inside" and job.failure is not None
-        assert job.failure["step"] == taken + 1
-        assert f"holds 'bottom' {depth:.3g} inside" in job.failure["reason"]
+        simulation = Simulation(one)
+        taken = len(list(simulation.steps()))
+        assert simulation.outcome == "support_inside_foundation" and simulation.failure is not None
+        assert simulation.failure["step"] == taken + 1
+        assert f"holds 'bottom' {depth:.3g} inside" in simulation.failure["reason"]
         assert taken == 2
-        kept, before = field(job, "u"), Simulation(one.override(**{"time.end": 0.5, "time.steps": 2}))
-        assert len(list(before.steps())) == 2 and before.outcome == "right"
+        kept, before = field(simulation, "u"), Simulation(one.override(**{"time.end": 0.5, "time.steps": 2}))
+        assert len(list(before.steps())) == 2 and before.outcome == "completed"
         assert np.abs(kept - field(before, "u")).max() <= 1e-14
     right(held(d, "bottom", "left", "t / 50", gap=0.02))
 
@@ -128,8 +128,8 @@ def a_wall_beside_its_support(d: int) -> None:
             turn = np.eye(d)
             turn[np.ix_([0, -1], [0, -1])] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
             again, mesh = turned(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}), turn)
-            job = right(again, mesh=mesh)
-            assert job.report.normal_force == pytest.approx(level.report.normal_force, rel=1e-9)
+            simulation = right(again, mesh=mesh)
+            assert simulation.report.normal_force == pytest.approx(level.report.normal_force, rel=1e-9)
 
 
 @check

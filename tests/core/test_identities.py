@@ -36,8 +36,8 @@ def scene(reading: str = "mixed", **keys: Any) -> Scene:
 
 def check(one: Scene, **how: Any) -> warmslip.Result:
     result = warmslip.run(one, **how)
-    assert result.outcome == "right"
-    worst = {name: result.summary["identities"][name] for name in BALANCES}
+    assert result.outcome == "completed"
+    worst = {name: result.summary["balances"][name] for name in BALANCES}
     assert worst["law"] <= 1e-11, worst
     assert max(v for k, v in worst.items() if k != "law") <= 1e-11, worst
     return result
@@ -49,11 +49,11 @@ def test_balances(tmp_path: Path, reading: str, coupling: str, quadrature: str) 
     # refinement is for round-off on fine meshes; here it could only mend a wrong right-hand side
     assert result.summary["cost"]["refinements"] == 0
     with Trajectory(tmp_path / "trajectory.h5") as t:
-        ledger = t.series("ledger")
+        balances = t.series("balances")
     for name in DISSIPATIONS:
-        assert (ledger[name] >= -1e-15 * np.abs(ledger["load_work"]).max()).all(), name
+        assert (balances[name] >= -1e-15 * np.abs(balances["load_work"]).max()).all(), name
     for name in ("energy", "heat", "force", "law"):
-        assert (ledger[f"{name}_residual"] <= 1e-11).all()
+        assert (balances[f"{name}_residual"] <= 1e-11).all()
     # the energy balance once more, from the terms in the file
     out = (
         "kinetic_change",
@@ -65,21 +65,21 @@ def test_balances(tmp_path: Path, reading: str, coupling: str, quadrature: str) 
         "viscous",
         "friction",
     )
-    left = sum(ledger[n] for n in out) - sum(ledger[n] for n in ("load_work", "expansion_work", "gap_work"))
-    assert np.abs(left).max() <= 1e-12 * max(np.abs(ledger[n]).max() for n in out)
+    left = sum(balances[n] for n in out) - sum(balances[n] for n in ("load_work", "expansion_work", "gap_work"))
+    assert np.abs(left).max() <= 1e-12 * max(np.abs(balances[n]).max() for n in out)
     left = (
-        sum(ledger[n] for n in ("heat_change", "heat_damping", "conducted", "exchanged"))
-        - ledger["supplied"]
-        - ledger["heating"]
+        sum(balances[n] for n in ("heat_change", "heat_damping", "conducted", "exchanged"))
+        - balances["supplied"]
+        - balances["heating"]
     )
-    assert np.abs(left).max() <= 1e-12 * np.abs(ledger["supplied"]).max()
+    assert np.abs(left).max() <= 1e-12 * np.abs(balances["supplied"]).max()
 
 
 def test_opposite_coupling_cancels() -> None:
     """R = -M, monolithic: what expansion takes from the motion, heating gives to the heat, term by term."""
-    job = warmslip.Simulation(scene("consistent", time__coupling="monolithic"))
-    for _, report in job.steps():
-        assert report.ledger.heating == pytest.approx(-report.ledger.expansion_work, rel=1e-11)
+    simulation = warmslip.Simulation(scene("consistent", time__coupling="monolithic"))
+    for _, report in simulation.steps():
+        assert report.balances.heating == pytest.approx(-report.balances.expansion_work, rel=1e-11)
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS)
@@ -101,7 +101,7 @@ def test_without_friction(tmp_path: Path, quadrature: str) -> None:
     assert result.summary["contact"]["normal_force"] > 0
     with Trajectory(tmp_path / "trajectory.h5") as t:
         assert (t.series("contact")["force"][..., 0] == 0).all()
-        assert (t.series("ledger")["friction"] == 0).all()
+        assert (t.series("balances")["friction"] == 0).all()
 
 
 def test_without_exchange_the_foundation_is_not_felt() -> None:
@@ -145,7 +145,7 @@ def test_small_changes_of_large_contents(tolerance: float | None, theta: float, 
     finally:
         for key in loose:
             options.delValue(key)
-    assert result.right and (result.summary["cost"]["refinements"] > 0 or not loose)
+    assert result.completed and (result.summary["cost"]["refinements"] > 0 or not loose)
     assert np.abs(result.theta - warmslip.run(one).theta).max() <= 2e-12 * theta
 
 

@@ -28,7 +28,7 @@ class Forces:
         self.normal: list[float] = []
         self.tangential: list[Any] = []
 
-    def __call__(self, job: Simulation, report: Any) -> None:
+    def __call__(self, simulation: Simulation, report: Any) -> None:
         self.normal.append(report.normal_force)
         self.tangential.append(np.array(report.friction_traction))
 
@@ -42,12 +42,12 @@ def test_a_pressed_body_stays_where_it_rests(d: int, steps: int) -> None:
     first: dict[str, Any] = {}
     forces, worst = Forces(), [0.0]
 
-    def each(job: Simulation, report: Any) -> None:
-        forces(job, report)
+    def each(simulation: Simulation, report: Any) -> None:
+        forces(simulation, report)
         if len(forces.normal) == 200:
-            first.update(u=field(job, "u"))
+            first.update(u=field(simulation, "u"))
         if len(forces.normal) > 200 and len(forces.normal) % 100 == 0:
-            worst.append(misses({"u": field(job, "u")}, first)["u"])
+            worst.append(misses({"u": field(simulation, "u")}, first)["u"])
 
     right(
         scene(
@@ -74,12 +74,14 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
     velocity = np.array(along(d, -2.0, 3.0))
     lost = [0.0]
 
-    def each(job: Simulation, report: Any) -> None:
-        if round(job.stepper.time / job.scene.step) % 100 == 0:
-            momentum = job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
+    def each(simulation: Simulation, report: Any) -> None:
+        if round(simulation.stepper.time / simulation.scene.step) % 100 == 0:
+            momentum = simulation.discretisation.field(
+                simulation.discretisation.operators.inertia * simulation.stepper.w
+            ).sum(axis=0)
             lost.append(float(np.abs(momentum - 5.0 * velocity).max()))
 
-    job = right(
+    simulation = right(
         scene(
             d,
             2,
@@ -93,9 +95,9 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
     )
     assert len(lost) > 10 and max(lost) <= 1e-11
     way = velocity * 0.1 * steps
-    assert np.abs(field(job, "w") - velocity).max() <= ROUND_OFF
-    assert np.abs(field(job, "u") - way).max() <= UNIT * steps * np.abs(way).max()
-    assert job.discretisation.mises(job.stepper).max() <= 1e-9
+    assert np.abs(field(simulation, "w") - velocity).max() <= ROUND_OFF
+    assert np.abs(field(simulation, "u") - way).max() <= UNIT * steps * np.abs(way).max()
+    assert simulation.discretisation.mises(simulation.stepper).max() <= 1e-9
 
 
 @long
@@ -108,7 +110,7 @@ def test_a_body_at_ambient_stays_there(d: int, steps: int, exchange: bool, k: fl
     """Foundation and body have one temperature, or the body is insulated: no step warms it."""
     foundation = {"conductance": 20.0, "foundation_temperature": 293.15}
     contact = {"contact": {"part": "bottom", "heat_exchange": foundation}} if exchange else {}
-    job = right(
+    simulation = right(
         scene(
             d,
             2,
@@ -118,7 +120,7 @@ def test_a_body_at_ambient_stays_there(d: int, steps: int, exchange: bool, k: fl
             **contact,
         )
     )
-    assert np.abs(field(job, "theta") - 293.15).max() <= ROUND_OFF * 293.15
+    assert np.abs(field(simulation, "theta") - 293.15).max() <= ROUND_OFF * 293.15
 
 
 # ---- impact and release ----------------------------------------------------------------------------------------------
@@ -142,9 +144,9 @@ def test_a_load_that_turns_every_step(d: int) -> None:
     assert pressed.report.normal_force > 0.1 and lifted.report.normal_force == 0.0
     turn = []
 
-    def each(job: Simulation, report: Any) -> None:
-        still = lifted if round(job.stepper.time) % 2 == 0 else pressed
-        turn.append(misses({"u": field(job, "u")}, {"u": field(still, "u")})["u"])
+    def each(simulation: Simulation, report: Any) -> None:
+        still = lifted if round(simulation.stepper.time) % 2 == 0 else pressed
+        turn.append(misses({"u": field(simulation, "u")}, {"u": field(still, "u")})["u"])
         assert report.normal_force == pytest.approx(still.report.normal_force, rel=ROUND_OFF)
 
     right(hanging("where(t % 2 > 0.5, -1, 1)", 1001), each=each)
@@ -162,9 +164,9 @@ def test_impact_and_release_every_few_steps(d: int, stiffness: Any) -> None:
     for young in (1e4, 1e5):
         forces, heights = Forces(), []
 
-        def each(job: Simulation, report: Any, forces: Forces = forces, heights: list[float] = heights) -> None:
-            forces(job, report)
-            heights.append(float(field(job, "u")[:, -1].mean()))
+        def each(simulation: Simulation, report: Any, forces: Forces = forces, heights: list[float] = heights) -> None:
+            forces(simulation, report)
+            heights.append(float(field(simulation, "u")[:, -1].mean()))
 
         right(
             scene(
@@ -209,8 +211,8 @@ def test_stick_slip_stick_follows_its_hysteresis(d: int) -> None:
     ).override(**{"mesh.lengths": [4.0] * (d - 1) + [1.0]})
     forces, slips = Forces(), []
 
-    def each(job: Simulation, report: Any) -> None:
-        forces(job, report)
+    def each(simulation: Simulation, report: Any) -> None:
+        forces(simulation, report)
         slips.append(report.stick == 0 and report.slip > 0)
 
     right(one, digits=5.0, each=each)
@@ -265,9 +267,9 @@ FLAT = ASPECT * UNIT  # round-off of a gradient there, relative
 
 
 def graded(d: int) -> Any:
-    """Bricks that grow by 1e4 along the first axis and shrink by as much along the last: slivers in two corners."""
+    """Cells that grow by 1e4 along the first axis and shrink by as much along the last: slivers in two corners."""
     n = 6 if d == 2 else 4
-    ratio = ASPECT ** (n / (n - 1))  # of sizes at the two ends, not of bricks
+    ratio = ASPECT ** (n / (n - 1))  # of sizes at the two ends, not of cells
     one = scene(d, n, heat={"conductivity": 1.0})
     return make_mesh(one.override(**{"mesh.grading": [ratio, *[1.0] * (d - 2), 1 / ratio]}))
 
@@ -298,7 +300,7 @@ def test_slivers_on_a_foundation(d: int, mesh: Callable[[int], Any]) -> None:
     slivers = mesh(d)
     assert slenderest(slivers) >= ASPECT
     r = young * press / (young + c)
-    job = right(
+    simulation = right(
         scene(
             d,
             1,
@@ -316,14 +318,14 @@ def test_slivers_on_a_foundation(d: int, mesh: Callable[[int], Any]) -> None:
         ),
         mesh=slivers,
     )
-    height = np.asarray(job.discretisation.mesh.nodes)[:, -1]
+    height = np.asarray(simulation.discretisation.mesh.nodes)[:, -1]
     u = np.zeros((len(height), d))
     u[:, -1] = -r - (press - r) * height
-    assert np.abs(field(job, "u") - u).max() <= FLAT * press
-    assert np.abs(field(job, "theta") - (3.0 - 2.0 * height)).max() <= FLAT * 3.0
-    weights = np.asarray(job.discretisation.surface.weights)
-    assert np.abs(fields(job)["contact force"][:, -1]) == pytest.approx(c * r * weights, rel=10 * FLAT)
-    assert job.report.normal_force == pytest.approx(c * r, rel=ROUND_OFF)
+    assert np.abs(field(simulation, "u") - u).max() <= FLAT * press
+    assert np.abs(field(simulation, "theta") - (3.0 - 2.0 * height)).max() <= FLAT * 3.0
+    weights = np.asarray(simulation.discretisation.surface.weights)
+    assert np.abs(fields(simulation)["contact force"][:, -1]) == pytest.approx(c * r * weights, rel=10 * FLAT)
+    assert simulation.report.normal_force == pytest.approx(c * r, rel=ROUND_OFF)
 
 
 @pytest.mark.parametrize("mesh", [graded, flat])
@@ -334,7 +336,7 @@ def test_a_patch_of_slivers(d: int, mesh: Callable[[int], Any]) -> None:
     axes = ("x", "y", "z")[:d]
     moved = [" + ".join(f"({g!r}) * {axis}" for g, axis in zip(row.tolist(), axes, strict=True)) for row in gradient]
     warmed = " - ".join(axes)
-    job = right(
+    simulation = right(
         scene(
             d,
             1,
@@ -346,11 +348,11 @@ def test_a_patch_of_slivers(d: int, mesh: Callable[[int], Any]) -> None:
         mesh=mesh(d),
         digits=4.0,
     )
-    x = np.asarray(job.discretisation.mesh.nodes)
-    assert np.abs(field(job, "u") - x @ gradient.T).max() <= FLAT * np.abs(x @ gradient.T).max()
-    assert np.abs(field(job, "theta") - (2 * x[:, 0] - x.sum(axis=1))).max() <= FLAT
-    stress = job.discretisation.stress(field(job, "u"), None, None)
+    x = np.asarray(simulation.discretisation.mesh.nodes)
+    assert np.abs(field(simulation, "u") - x @ gradient.T).max() <= FLAT * np.abs(x @ gradient.T).max()
+    assert np.abs(field(simulation, "theta") - (2 * x[:, 0] - x.sum(axis=1))).max() <= FLAT
+    stress = simulation.discretisation.stress(field(simulation, "u"), None, None)
     strain = (gradient + gradient.T) / 2
-    lam, shear = job.scene.elasticity.pair(d)
+    lam, shear = simulation.scene.elasticity.pair(d)
     exact = lam * np.trace(strain) * np.eye(d) + 2 * shear * strain
     assert np.abs(stress - exact).max() <= 10 * FLAT * np.abs(exact).max()

@@ -41,7 +41,7 @@ def body(mesh: str = "square", matrix: str = "lumped", step: float = 1e-5, **tab
 def extremes(scene: Scene, **given: Any) -> tuple[float, float]:
     states: list[Any] = []
     done = warmslip.run(scene, observers=[lambda state, _: states.append(state.theta)], **given)
-    assert done.right, done.summary["failure"]
+    assert done.completed, done.summary["failure"]
     return float(np.min(states)), float(np.max(states))
 
 
@@ -89,7 +89,7 @@ def test_in_every_coupling(coupling: str) -> None:
     assert least >= -ROUND and most <= HOT + ROUND
     heated = scene.override(**{"heat.heating.tensor": [[0.3, 0.1], [0.1, -0.2]]})
     done = warmslip.run(heated)
-    assert done.right and max(done.summary["identities"][i] for i in ("energy", "heat", "force")) <= 1e-11
+    assert done.completed and max(done.summary["balances"][i] for i in ("energy", "heat", "force")) <= 1e-11
 
 
 def test_where_pressure_leads_the_heat() -> None:
@@ -171,8 +171,8 @@ def test_two_ranks(command: Command, tmp_path: Path) -> None:
     )
     for ranks in (1, 2):
         options = [word for key in keys for word in ("--set", key)]
-        said = command("run", "paper_mixed", *options, "--out", f"run{ranks}", ranks=ranks)
-        assert said.returncode == 0, said.stderr
+        message = command("run", "paper_mixed", *options, "--out", f"run{ranks}", ranks=ranks)
+        assert message.returncode == 0, message.stderr
         assert json.loads((tmp_path / f"run{ranks}/summary.json").read_text())["stamp"]["ranks"] == ranks
         with Trajectory(tmp_path / f"run{ranks}/trajectory.h5") as t:
             ends.append([t.u[-1], t.theta[-1]])

@@ -18,9 +18,9 @@ check = Checks()
 STEEL: dict[str, Any] = {"young": 2.1e11, "poisson": 0.3}
 
 
-def bottom(job: Simulation) -> Any:
+def bottom(simulation: Simulation) -> Any:
     """Which nodes lie at the bottom, (nodes)."""
-    return np.asarray(job.discretisation.mesh.nodes)[:, -1] == 0
+    return np.asarray(simulation.discretisation.mesh.nodes)[:, -1] == 0
 
 
 # ---- depths ----------------------------------------------------------------------------------------------------------
@@ -28,9 +28,9 @@ def bottom(job: Simulation) -> Any:
 
 @check
 def depths_far_below_the_free_motion(d: int) -> None:
-    """Every node of one brick is held or presses on a foundation 1e12 times as stiff: u is the depth p / c, and no more."""
+    """Every node of one grid cell is held or presses on a foundation 1e12 times as stiff: u is the depth p / c, and no more."""
     for coupling in ("staggered", "monolithic"):
-        job = right(
+        simulation = right(
             scene(
                 d,
                 1,
@@ -50,8 +50,8 @@ def depths_far_below_the_free_motion(d: int) -> None:
             ),
             digits=12.0,
         )
-        depth = -field(job, "u")[bottom(job), -1]
-        pressure = -forces_of(job)[:, -1] / np.asarray(job.discretisation.surface.weights)
+        depth = -field(simulation, "u")[bottom(simulation), -1]
+        pressure = -forces_of(simulation)[:, -1] / np.asarray(simulation.discretisation.surface.weights)
         assert pressure.min() > 1e3 and depth == pytest.approx(pressure / 1e24, rel=1e-12)
 
 
@@ -59,7 +59,7 @@ def depths_far_below_the_free_motion(d: int) -> None:
 def energy_of_a_stiff_foundation(d: int) -> None:
     """Of depths that are rounding of the displacement, the energy is that of the forces."""
     stiffness = 1e15
-    job = right(
+    simulation = right(
         scene(
             d,
             2,
@@ -70,16 +70,16 @@ def energy_of_a_stiff_foundation(d: int) -> None:
         ),
         digits=6.0,
     )
-    pressing = -forces_of(job)[:, -1]
-    stored = (pressing**2 / np.asarray(job.discretisation.surface.weights)).sum() / (2 * stiffness)
-    assert pressing.sum() > 0.1 and job.report.ledger.contact == pytest.approx(stored, rel=1e-10, abs=0)
+    pressing = -forces_of(simulation)[:, -1]
+    stored = (pressing**2 / np.asarray(simulation.discretisation.surface.weights)).sum() / (2 * stiffness)
+    assert pressing.sum() > 0.1 and simulation.report.balances.contact == pytest.approx(stored, rel=1e-10, abs=0)
 
 
 @check
 def a_body_comes_to_rest(d: int) -> None:
     """A block thrown on to a rough foundation stops: what is left of its speed is 1e-11 of it, and has all its digits."""
     for stiffness in (3e9, "rigid"):
-        job = right(
+        simulation = right(
             scene(
                 d,
                 1,
@@ -92,9 +92,9 @@ def a_body_comes_to_rest(d: int) -> None:
             ),
             digits=11.0,
         )
-        u = field(job, "u")
-        assert np.asarray(job.stepper.status).min() > 0 and np.abs(u).max() < 1e-5
-        assert np.abs(u[bottom(job), -1] + 1e-8).max() <= 1e-9
+        u = field(simulation, "u")
+        assert np.asarray(simulation.stepper.status).min() > 0 and np.abs(u).max() < 1e-5
+        assert np.abs(u[bottom(simulation), -1] + 1e-8).max() <= 1e-9
 
 
 # ---- light touches ---------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def a_warmed_rod(d: int) -> None:
 def rest_makes_no_heat(d: int) -> None:
     """Points that stick make no heat at all, nodal or Gauss's, however hard they are pushed."""
     for quadrature in ("nodal", "gauss-2"):
-        job = right(
+        simulation = right(
             scene(
                 d,
                 2,
@@ -155,7 +155,7 @@ def rest_makes_no_heat(d: int) -> None:
                 },
             )
         )
-        assert np.asarray(job.stepper.status).max() == 1 and np.abs(field(job, "theta")).max() == 0
+        assert np.asarray(simulation.stepper.status).max() == 1 and np.abs(field(simulation, "theta")).max() == 0
 
 
 @check
@@ -163,7 +163,7 @@ def a_contact_that_leads_all_heat(d: int) -> None:
     """A contact of ever better conductance takes the temperature of the foundation, to the digits that doubles leave it."""
     miss = {}
     for per_pressure in (1e4, 1e5, 1e15, 1e18):
-        job = right(
+        simulation = right(
             scene(
                 d,
                 4 if d == 2 else 2,
@@ -183,7 +183,7 @@ def a_contact_that_leads_all_heat(d: int) -> None:
                 },
             )
         )
-        miss[per_pressure] = np.abs(field(job, "theta")[bottom(job)] / 400.0 - 1).max()
+        miss[per_pressure] = np.abs(field(simulation, "theta")[bottom(simulation)] / 400.0 - 1).max()
     assert miss[1e4] / miss[1e5] == pytest.approx(10, rel=0.02) and max(miss[1e15], 1e-3 * miss[1e18]) <= 1e-14
 
 
@@ -196,7 +196,7 @@ def regularised_friction_of_any_sharpness(d: int) -> None:
     answers = {}
     for sharpness in (0.0, 1e-4, 1e-5, 1e-6, 1e-12):
         friction = {"coefficient": 2.0} | ({"regularisation": sharpness} if sharpness else {})
-        job = right(
+        simulation = right(
             scene(
                 d,
                 1,
@@ -206,8 +206,8 @@ def regularised_friction_of_any_sharpness(d: int) -> None:
                 contact={"part": "bottom", "stiffness": 1e4, "friction": friction},
             )
         )
-        assert set(job.statistics.stages) == {"newton"} and job.statistics.newton_max <= 6
-        answers[sharpness] = forces_of(job)
+        assert set(simulation.statistics.stages) == {"newton"} and simulation.statistics.newton_max <= 6
+        answers[sharpness] = forces_of(simulation)
     exact = answers.pop(0.0)
     miss = {e: np.abs(found - exact).max() / np.abs(exact).max() for e, found in answers.items()}
     assert miss[1e-5] / miss[1e-6] == pytest.approx(10, rel=0.1) and miss[1e-12] <= 1e-9
@@ -219,7 +219,7 @@ def gauss_points_on_a_rigid_foundation(d: int) -> None:
     for friction in ({}, {"friction": {"coefficient": 0.3}}):
         for supports in ({"displacement": ["top"]}, None):
             tables = {} if supports is None else {"supports": supports}
-            job = right(
+            simulation = right(
                 scene(
                     d,
                     3,
@@ -232,7 +232,7 @@ def gauss_points_on_a_rigid_foundation(d: int) -> None:
                 )
             )
             if supports is None and friction:  # it rests
-                assert -forces_of(job).sum(axis=0)[-1] == pytest.approx(1.0, rel=0.05)
+                assert -forces_of(simulation).sum(axis=0)[-1] == pytest.approx(1.0, rel=0.05)
 
 
 @check
@@ -256,7 +256,7 @@ def shares_beside_a_clamped_edge(d: int) -> None:
 
 @check
 def shares_of_as_many_points_as_nodes(d: int) -> None:
-    """One brick beside its support: the node that moves has more points than it needs, and their least share is N f / sum N^2."""
+    """A cell beside its support: the node that moves has more points than it needs; their least share is N f / sum N^2."""
     one = scene(
         d,
         1,
@@ -266,12 +266,14 @@ def shares_of_as_many_points_as_nodes(d: int) -> None:
         loads={"body": along(d, -1e-3)},
         contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-2"},
     )
-    job = right(one)
-    surface = job.discretisation.surface
-    found = -forces_of(job)[:, -1]
-    nodes, places = np.asarray(job.discretisation.mesh.nodes), np.asarray(surface.positions)
+    simulation = right(one)
+    surface = simulation.discretisation.surface
+    found = -forces_of(simulation)[:, -1]
+    nodes, places = np.asarray(simulation.discretisation.mesh.nodes), np.asarray(surface.positions)
     shape = np.zeros((len(places), len(nodes)))
-    for facet in np.asarray(job.discretisation.mesh.parts["bottom"]):  # barycentric coordinates where they are positive
+    for facet in np.asarray(
+        simulation.discretisation.mesh.parts["bottom"]
+    ):  # barycentric coordinates where they are positive
         corners = np.vstack([nodes[facet, :-1].T, np.ones(d)])
         inside = np.linalg.solve(corners, np.vstack([places[:, :-1].T, np.ones(len(places))])).T
         own = inside.min(axis=1) > 0
@@ -295,17 +297,17 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
             supports={"displacement": {"top": along(d, "-0.001 * t", "0.0008 * t")}},
             contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-3"} | friction,
         )
-        job, other = right(one), Simulation(one, backend="petsc")
+        simulation, other = right(one), Simulation(one, backend="petsc")
         for _ in other.steps():
             pass
-        found, again = forces_of(job), forces_of(other)
+        found, again = forces_of(simulation), forces_of(other)
         assert np.abs(found - again).max() <= 1e-11 * np.abs(found).max()
-        traction = found / np.asarray(job.discretisation.surface.weights)[:, None]
+        traction = found / np.asarray(simulation.discretisation.surface.weights)[:, None]
         pressing = -traction[:, -1]
         assert pressing.min() >= 0
         if friction:
             continue  # at its bound the friction holds the pressure back
-        compliance = np.array(job.stepper.contact_compliance)[d - 1 :: d, d - 1 :: d]
+        compliance = np.array(simulation.stepper.contact_compliance)[d - 1 :: d, d - 1 :: d]
         values, modes = np.linalg.eigh(compliance)  # whose range are the fields that are linear in every facet
         linear = modes[:, values > 1e-9 * values[-1]]
         bears = pressing > 0

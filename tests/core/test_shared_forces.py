@@ -52,10 +52,10 @@ ROUGH = {  # a normal force with friction is shared
 
 
 def known(scene: Scene) -> tuple[ContactPoints, several_solutions.Finding]:
-    job = Simulation(scene)
-    return several_solutions.condensed(job.discretisation, job.stepper).rubbing, several_solutions.of_scene(
-        job.discretisation, job.stepper
-    )
+    simulation = Simulation(scene)
+    return several_solutions.condensed(
+        simulation.discretisation, simulation.stepper
+    ).rubbing, several_solutions.of_scene(simulation.discretisation, simulation.stepper)
 
 
 def counts(points: ContactPoints, rng: Any, tries: int) -> list[int]:
@@ -179,11 +179,11 @@ def test_a_run_that_has_another_solution_says_so(name: str) -> None:
             "supports.displacement": {"top": [f"{one} * t" for one in moved]},
         }
     )
-    job = Simulation(scene)
-    assert list(job.steps()) and job.outcome == "right"
-    points, free, penetration = several_solutions.posed(job.discretisation, job.stepper)
+    simulation = Simulation(scene)
+    assert list(simulation.steps()) and simulation.outcome == "completed"
+    points, free, penetration = several_solutions.posed(simulation.discretisation, simulation.stepper)
     moves = np.diag(points.compliance).reshape(-1, 2).sum(axis=1) > 0
     found = velocities(points.of(moves), Step(free[moves], penetration[moves], free[moves]))
     assert len(found) > 1
-    (told,) = [one for one in summary(job)["warnings"] if "several" in one]
-    assert words in told
+    (output,) = [one for one in summary(simulation)["warnings"] if "several" in one]
+    assert words in output

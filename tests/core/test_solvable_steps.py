@@ -16,13 +16,13 @@ from warmslip.simulation.simulation import Simulation
 class Posed:
     """What the law reads in the last step of a run: compliance, free velocities, penetrations, normals, weights, forces."""
 
-    def __init__(self, job: Simulation) -> None:
-        surface, stepper = job.discretisation.surface, job.stepper
-        self.k = job.discretisation.scene.step
+    def __init__(self, simulation: Simulation) -> None:
+        surface, stepper = simulation.discretisation.surface, simulation.stepper
+        self.k = simulation.discretisation.scene.step
         self.C, self.free = np.array(stepper.contact_compliance), np.array(stepper.contact_free)
         self.penetration = np.asarray(stepper.contact_penetration)
         self.normals, self.weights = np.asarray(surface.normals), np.asarray(surface.weights)
-        self.force = forces_of(job)
+        self.force = forces_of(simulation)
 
     def velocity(self, force: Any) -> Any:
         """Velocities of the points under their forces, both (points, d)."""
@@ -69,7 +69,7 @@ def frozen_thresholds(posed: Posed, stiffness: float, mu: float) -> Any:
 
 def test_stiff_foundation_in_space() -> None:
     """54 Gauss points, a foundation 5e5 times as stiff as the body, strong friction."""
-    job = right(
+    simulation = right(
         scene(
             3,
             [3, 3, 1],
@@ -86,7 +86,7 @@ def test_stiff_foundation_in_space() -> None:
             },
         )
     )
-    posed = Posed(job)
+    posed = Posed(simulation)
     found = posed.velocity(posed.force)
     expected = posed.velocity(frozen_thresholds(posed, 5e5, 1.0))
     assert np.abs(found - expected).max() <= 1e-7 * np.abs(posed.free).max()
@@ -95,7 +95,7 @@ def test_stiff_foundation_in_space() -> None:
 @pytest.mark.parametrize(("d", "n", "points"), [(3, 2, "gauss-3"), (2, 5, "gauss-3")])
 def test_rigid_foundation_with_a_curved_gap(d: int, n: int, points: str) -> None:
     """A convex quadratic programme: pressures, depths and their products decide alone whether its solution was found."""
-    job = right(
+    simulation = right(
         scene(
             d,
             [n] * (d - 1) + [1],
@@ -106,7 +106,7 @@ def test_rigid_foundation_with_a_curved_gap(d: int, n: int, points: str) -> None
             contact={"part": "bottom", "stiffness": "rigid", "quadrature": points, "gap": "1e-4 * (x - 0.5)**2"},
         )
     )
-    posed = Posed(job)
+    posed = Posed(simulation)
     pressing, friction = posed.split(posed.force)
     depth, reach = posed.depth(posed.force), np.abs(posed.free).max()
     assert pressing.min() >= 0 and np.abs(friction).max() <= 1e-15 * pressing.max()
@@ -115,7 +115,7 @@ def test_rigid_foundation_with_a_curved_gap(d: int, n: int, points: str) -> None
 
 def test_friction_that_weakens_by_slip() -> None:
     """Two points, one at rest and one that slips, found by trying all statuses."""
-    job = right(
+    simulation = right(
         scene(
             2,
             [1, 3],
@@ -130,7 +130,7 @@ def test_friction_that_weakens_by_slip() -> None:
             },
         ).override(**{"mesh.lengths": [1.0, 20.0]})
     )
-    posed, answers = Posed(job), []
+    posed, answers = Posed(simulation), []
 
     def law(statuses: tuple[str, ...], unknown: Any) -> Any:
         force = unknown.reshape(2, 2)
@@ -166,7 +166,7 @@ def test_friction_that_weakens_by_slip() -> None:
 
 def test_sharp_regularisation_at_gauss_points() -> None:
     """Three points on two nodes, whose shares friction regularised at 1e-8 of the velocities decides."""
-    job = right(
+    simulation = right(
         scene(
             2,
             1,
@@ -181,8 +181,8 @@ def test_sharp_regularisation_at_gauss_points() -> None:
             },
         )
     )
-    assert set(job.statistics.stages) == {"newton"}
-    posed = Posed(job)
+    assert set(simulation.statistics.stages) == {"newton"}
+    posed = Posed(simulation)
     pressing, friction = posed.split(posed.force)
     w = posed.split(posed.velocity(posed.force))[1][:, 0]
     assert pressing == pytest.approx(40 * posed.weights * np.maximum(posed.depth(posed.force), 0), rel=1e-9)

@@ -42,9 +42,9 @@ def free(d: int, part: str, load: Any, mu: float = 0.5, n: int = 2, **contact: A
 
 
 def outcome(one: Any, mesh: Any = None) -> str:
-    job = Simulation(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
-    assert not list(job.steps()) or job.outcome == "right"
-    return job.outcome
+    simulation = Simulation(one, discretisation=None if mesh is None else discretise(one, mesh=mesh))
+    assert not list(simulation.steps()) or simulation.outcome == "completed"
+    return simulation.outcome
 
 
 def unheld(d: int, part: str) -> Iterator[Any]:
@@ -96,9 +96,9 @@ def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
     """Statics: on a curved foundation the load's centre, 5/9, lies between the rows at 1/2 and 1, that take 4/3 and 1/6."""
     body = [0.0] * (d - 1) + ["-1 - x"]
     for gap in ("0.01 + 0.1 * (x - 0.3)**2", "0.1 * (x - 0.3)**2"):
-        job = right(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
-        force = np.reshape(job.stepper.contact_force, (-1, d))[:, -1]
-        place = np.asarray(job.discretisation.surface.positions)[:, 0]
+        simulation = right(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
+        force = np.reshape(simulation.stepper.contact_force, (-1, d))[:, -1]
+        place = np.asarray(simulation.discretisation.surface.positions)[:, 0]
         rows = [-force[np.abs(place - x) < 0.1].sum() for x in (0.0, 0.5, 1.0)]
         assert rows == pytest.approx([0.0, 4 / 3, 1 / 6], abs=1e-11)
     balanced = free(d, "bottom", [0.0] * (d - 1) + [-1.0], stiffness="rigid", gap="0.01 + 0.1 * (x - 0.5)**2")
@@ -108,9 +108,9 @@ def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
 @check
 def a_load_that_lifts_it_later_ends_the_run_there(d: int) -> None:
     one = free(d, "bottom", [0.0] * (d - 1) + ["4 * t - 2.6"], gap=0.01).override(**{"time.steps": 4})
-    job = Simulation(one)
-    assert (len(list(job.steps())), job.outcome) == (2, "unsupported")
-    assert job.report.normal_force == pytest.approx(0.6, rel=1e-12)
+    simulation = Simulation(one)
+    assert (len(list(simulation.steps())), simulation.outcome) == (2, "unsupported")
+    assert simulation.report.normal_force == pytest.approx(0.6, rel=1e-12)
 
 
 @check
@@ -121,7 +121,7 @@ def a_push_that_friction_resists(d: int) -> None:
         for stiffness in (1e10, "rigid"):
             for push in (0.0, 1e-6, 1e-3, 1.0, 5e3):
                 for sign in (1, -1):
-                    job = Simulation(
+                    simulation = Simulation(
                         scene(
                             d,
                             n,
@@ -140,10 +140,10 @@ def a_push_that_friction_resists(d: int) -> None:
                             },
                         )
                     )
-                    for _ in job.steps():
+                    for _ in simulation.steps():
                         pass
-                    assert job.outcome == "right", (n, gap, stiffness, sign * push, job.failure)
-                    force = np.reshape(job.stepper.contact_force, (-1, d)).sum(axis=0)  # of all ranks
+                    assert simulation.outcome == "completed", (n, gap, stiffness, sign * push, simulation.failure)
+                    force = np.reshape(simulation.stepper.contact_force, (-1, d)).sum(axis=0)  # of all ranks
                     wanted = np.array(along(d, -76518.0, sign * push)) * 0.1**d
                     assert np.abs(force - wanted).max() <= 1e-9 * np.abs(wanted).max()
 
@@ -163,7 +163,7 @@ def a_stiff_body_on_a_soft_layer(d: int) -> None:
         contact={"part": "bottom", "stiffness": 1e9, "friction": {"coefficient": 0.4}},
     )
     for scale in (1.0, 1.27e3, 0.0321):
-        job = right(
+        simulation = right(
             one.override(
                 **{
                     "mesh.lengths": [0.1 * scale] * d,
@@ -173,7 +173,7 @@ def a_stiff_body_on_a_soft_layer(d: int) -> None:
             ),
             digits=6.0,
         )
-        force = np.reshape(job.stepper.contact_force, (-1, d)).sum(axis=0)
+        force = np.reshape(simulation.stepper.contact_force, (-1, d)).sum(axis=0)
         wanted = np.array(along(d, -load, 0.1 * load)) * (0.1 * scale) ** (d - 1)
         assert np.abs(force - wanted).max() <= 1e-11 * load * (0.1 * scale) ** (d - 1)
 
@@ -236,7 +236,7 @@ def what_held_it_lets_it_fly(d: int) -> None:
     """A constant friction bound acts without pressure: it calms a falling body until nothing but its fall is left."""
     n, steps, end = (24, 24, 0.00424) if d == 2 else (4, 24, 0.02)
     for density, young in ((917.0, 9e9), (600.0, 1e10)):
-        job = Simulation(
+        simulation = Simulation(
             scene(
                 d,
                 n,
@@ -249,8 +249,10 @@ def what_held_it_lets_it_fly(d: int) -> None:
                 contact={"part": "bottom", "stiffness": "rigid", "gap": 0.1, "friction": {"cohesion": 3e4}},
             )
         )
-        assert len(list(job.steps())) == steps, job.failure
-        momentum = job.discretisation.field(job.discretisation.operators.inertia * job.stepper.w).sum(axis=0)
+        assert len(list(simulation.steps())) == steps, simulation.failure
+        momentum = simulation.discretisation.field(
+            simulation.discretisation.operators.inertia * simulation.stepper.w
+        ).sum(axis=0)
         assert momentum[-1] == pytest.approx(density * 0.1**d * (-0.1 - 9.81 * end), rel=1e-12)
 
 

@@ -34,9 +34,9 @@ def history(one: Any, units: Units, d: int) -> list[dict[str, Any]]:
     """Every step's u and w in mesh numbering and the forces of the contact points, in units of 1."""
     found: list[dict[str, Any]] = []
 
-    def keep(job: Any, report: Any) -> None:
-        force = forces_of(job) / (units.force if d == 3 else units.force / units.length)
-        found.append({name: field(job, name) / units.field[name] for name in ("u", "w")} | {"force": force})
+    def keep(simulation: Any, report: Any) -> None:
+        force = forces_of(simulation) / (units.force if d == 3 else units.force / units.length)
+        found.append({name: field(simulation, name) / units.field[name] for name in ("u", "w")} | {"force": force})
 
     right(one, each=keep)
     return found
@@ -161,7 +161,10 @@ def a_block_that_slides_on_a_rigid_foundation(d: int) -> None:
 
     def forces(scale: float) -> Any:
         found: list[Any] = []
-        right(one.override(**{"mesh.lengths": [scale, scale]}), each=lambda job, _: found.append(forces_of(job)))
+        right(
+            one.override(**{"mesh.lengths": [scale, scale]}),
+            each=lambda simulation, _: found.append(forces_of(simulation)),
+        )
         return np.array(found)
 
     first = forces(1.0)

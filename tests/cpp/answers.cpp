@@ -33,9 +33,9 @@ void solve(std::ostream& out, const std::string& name, const PaperProblem<d>& pa
   Stepper<d> stepper = paper.stepper({1.0 / steps, coupling, backend, {}});
   paper.start(stepper);
   for (int n = 0; n < steps; ++n)
-    if (const auto report = stepper.advance(paper.loads()); report.outcome != Outcome::right)
+    if (const auto report = stepper.advance(paper.loads()); report.outcome != Outcome::completed)
       throw std::runtime_error(name + " stopped: " + report.reason);
-  const Level& end = stepper.level();
+  const TimeLevel& end = stepper.level();
   write(out, name + ":u", paper.layout.gather(end.u));
   write(out, name + ":w", paper.layout.gather(end.w));
   write(out, name + ":theta", paper.layout.gather(end.theta));

@@ -142,7 +142,7 @@ void check_steps(const PaperProblem<d>& paper, Coupling coupling, bool refine) {
   const StepLoads loads = paper.loads();
   Stepper<d> stepper = paper.stepper(options<d>(coupling, refine));
   const auto advance = [&] {
-    if (stepper.advance(loads).outcome != Outcome::right) throw std::runtime_error("the step was not taken");
+    if (stepper.advance(loads).outcome != Outcome::completed) throw std::runtime_error("the step was not taken");
   };
   const auto before = [&](int steps) {
     paper.start(stepper);

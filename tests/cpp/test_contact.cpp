@@ -71,10 +71,10 @@ double defect(const Body<d>& body, const ContactSolution<d>& s) {
   return worst;
 }
 
-ContactOptions only(int newton, int fixed_point, int enumerate) {
+ContactOptions only(int newton, int tresca_fixed_point, int enumerate) {
   ContactOptions options;
   options.newton_steps = newton;
-  options.fixed_point_steps = fixed_point;
+  options.fixed_point_steps = tresca_fixed_point;
   options.enumerate_points = enumerate;
   return options;
 }
@@ -106,8 +106,8 @@ std::vector<std::pair<std::string, ContactLaw>> laws() {
 double bend(const ContactLaw& law) {
   if (law.friction.limit < unlimited)
     return (law.friction.limit - law.friction.cohesion) / (law.friction.coefficient * 50);
-  return law.compliance.most < unlimited
-             ? std::pow(law.compliance.most / law.compliance.stiffness, 1 / law.compliance.exponent)
+  return law.compliance.pressure_limit < unlimited
+             ? std::pow(law.compliance.pressure_limit / law.compliance.stiffness, 1 / law.compliance.exponent)
              : 1e9;
 }
 
@@ -116,7 +116,7 @@ double bend(const ContactLaw& law) {
 TEST_CASE_TEMPLATE("the derivative of the law's residual is its finite difference", D, Two, Three) {
   constexpr int d = D::value;
   const double k = 0.2, step = 1e-6;
-  const OwnCompliance own{0.02, 1.4};
+  const PointCompliance own{0.02, 1.4};
   for (const auto& [name, law] : laws()) {
     CAPTURE(name);
     Random random(3);
@@ -283,7 +283,7 @@ TEST_CASE("three points: Newton, fixed point and enumeration agree") {
     REQUIRE(c.converged);
     if (c.force.norm() > 0) {  // an open body is right from the start
       CHECK(a.stage == Stage::newton);
-      CHECK(b.stage == Stage::fixed_point);
+      CHECK(b.stage == Stage::tresca_fixed_point);
       CHECK(c.stage == Stage::enumeration);
     }
     CHECK((a.force - c.force).norm() <= 1e-10 * (1 + c.force.norm()));
@@ -305,7 +305,7 @@ TEST_CASE_TEMPLATE("failure is said and never thrown", D, Two, Three) {
   CHECK_FALSE(ContactSolver<d>(body.compliance, impossible).solve(body.problem, guess).converged);
   const auto slow = ContactSolver<d>(body.compliance, only(0, 20000, 0)).solve(body.problem, guess);
   CHECK(slow.converged);
-  CHECK(slow.stage == Stage::fixed_point);
+  CHECK(slow.stage == Stage::tresca_fixed_point);
   body.problem.free[1] = NAN;
   CHECK_FALSE(ContactSolver<d>(body.compliance).solve(body.problem, guess).converged);
   CHECK_THROWS_AS(ContactSolver<d>(Eigen::MatrixXd::Identity(d, d + 1)), std::invalid_argument);
@@ -345,7 +345,7 @@ TEST_CASE_TEMPLATE("points that outnumber their nodes share the least forces, wh
     }
     if (!found[0].converged || !found[1].converged || !found[2].converged) continue;
     const std::vector<ContactSolution<d>> before = found;
-    for (auto& one : found) CHECK(share_least(problem, shape, options.tolerance, one));
+    for (auto& one : found) CHECK(minimal_forces(problem, shape, options.tolerance, one));
     const auto size = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
       double sum = 0;
       for (int q = 0; q < points; ++q)

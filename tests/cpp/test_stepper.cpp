@@ -11,13 +11,13 @@ namespace {
 using Two = std::integral_constant<int, 2>;
 using Three = std::integral_constant<int, 3>;
 
-/// Steps to T = 1 that close their books.
+/// Steps to T = 1 whose balances close.
 template <int d>
 struct Paper : PaperProblem<d> {
   using PaperProblem<d>::PaperProblem;
   using PaperProblem<d>::layout, PaperProblem<d>::surface;
 
-  /// |u|_V, |w|, |theta|, normal force after `steps` steps to T = 1, every identity within 1e-11 on the way. With
+  /// |u|_V, |w|, |theta|, normal force after `steps` steps to T = 1, every balance within 1e-11 on the way. With
   /// `refine`, every step gets the iterative refinement that only fine meshes need.
   Eigen::Vector4d run(int steps, Coupling coupling, Backend backend = Backend::automatic, bool refine = false) {
     const Trapping trapping;
@@ -28,8 +28,8 @@ struct Paper : PaperProblem<d> {
     StepReport<d> report;
     for (int n = 0; n < steps; ++n) {
       report = stepper.advance(this->loads());
-      REQUIRE(report.outcome == Outcome::right);
-      const Ledger& l = report.ledger;
+      REQUIRE(report.outcome == Outcome::completed);
+      const Balances& l = report.balances;
       CHECK(std::max({l.energy_residual, l.heat_residual, l.force_residual}) <= 1e-11);
       CHECK(l.law_residual <= 1e-11);
       CHECK(std::min({l.inertia_damping, l.elastic_damping, l.contact_damping, l.viscous, l.friction, l.heat_damping,

@@ -161,7 +161,7 @@ def trajectory(data: bytes) -> bool:
                     (file.attrs if name == "scene" else file)[name] = value
     try:
         with warmslip.Trajectory(path) as t:
-            for group in ("steps", "ledger", "contact"):
+            for group in ("steps", "balances", "contact"):
                 t.series(group)
             for states in (t.u, t.w, t.theta):
                 assert states is None or states[:].shape[1] == len(t.nodes)

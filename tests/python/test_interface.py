@@ -33,12 +33,12 @@ def test_about_a_dozen_names_all_keyword_only_but_the_first() -> None:
 
 
 def test_states_are_read_in_the_loop(small: Small) -> None:
-    job = warmslip.Simulation(small())
+    simulation = warmslip.Simulation(small())
     states = []
-    for state, report in job.steps():
+    for state, report in simulation.steps():
         assert state.u.shape == state.w.shape == (25, 2) and state.theta.shape == (25,)
         assert state.stress.shape == (32, 2, 2) and state.mises.shape == (32,)
-        pressing = state.contact["pressure"] @ np.asarray(job.discretisation.surface.weights)
+        pressing = state.contact["pressure"] @ np.asarray(simulation.discretisation.surface.weights)
         assert pressing == pytest.approx(report.normal_force, rel=1e-12)
         states.append(state)
     assert [state.step for state in states] == [1, 2, 3, 4]
@@ -59,11 +59,11 @@ def test_observers_see_every_step(small: Small) -> None:
 
 
 def test_operators_and_factors_are_petsc_objects(small: Small) -> None:
-    job = warmslip.Simulation(small())
-    right = job.discretisation.operators.elasticity.createVecRight()
+    simulation = warmslip.Simulation(small())
+    right = simulation.discretisation.operators.elasticity.createVecRight()
     out = right.duplicate()
     right.set(1.0)
-    job.stepper.momentum_factor.solve(right, out)
+    simulation.stepper.momentum_factor.solve(right, out)
     assert out.norm() > 0
 
 

@@ -44,7 +44,7 @@ class Mesh:
 
 
 def box(*counts: int) -> Mesh:
-    """The unit square or cube in bricks, each cut into d! simplices along its main diagonal (Kuhn); x runs fastest."""
+    """The unit square or cube in cells, each cut into d! simplices along its main diagonal (Kuhn); x runs fastest."""
     d = len(counts)
     lattice = sorted(itertools.product(*(range(c + 1) for c in counts)), key=lambda p: p[::-1])
     number = {p: i for i, p in enumerate(lattice)}

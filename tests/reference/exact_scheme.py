@@ -53,12 +53,12 @@ class Scheme:
         self.c_nu, self.gap = exact(contact["stiffness"])[()], exact(contact["gap"])[()]
         self.mu = exact(contact["friction"]["coefficient"])[()]
         self.initial = scene["initial"]
-        self.clamped, self.cooled = (
+        self.prescribed_displacement, self.prescribed_temperature = (
             sorted({node for part in supports[key] for facet in mesh.parts[part] for node in facet})
             for key in ("displacement", "temperature")
         )
         self.forms = assemble(scene, mesh)
-        self.points = contact_points(mesh, contact["part"], contact["quadrature"], self.clamped)
+        self.points = contact_points(mesh, contact["part"], contact["quadrature"], self.prescribed_displacement)
         still = (0,) * (self.d - 1)
         axes = [(*still[:i], sign, *still[i + 1 :]) for i in range(self.d - 1) for sign in (1, -1)]
         self.directions = axes if self.mu else [still]
@@ -68,7 +68,7 @@ class Scheme:
         """The inverse of S without supports, what takes y to the contact points' (normal, tangential) frame, W = B S^-1 B'."""
         f, k, d = self.forms, self.k, self.d
         momentum, heat = f.inertia / k + f.viscosity + k * f.elasticity, f.storage / k + f.conduction + f.exchange
-        held_w, held_theta = [d * a + c for a in self.clamped for c in range(d)], self.cooled
+        held_w, held_theta = [d * a + c for a in self.prescribed_displacement for c in range(d)], self.prescribed_temperature
         S, held = momentum, held_w
         if self.coupling == "monolithic":
             S = np.block([[momentum, -f.expansion], [-f.heating, heat]])
@@ -89,7 +89,7 @@ class Scheme:
         """The scene's constant initial data, zero on the supports."""
         u, w = (np.tile(exact(self.initial.get(x) or [0] * self.d), (self.N, 1)) for x in ("displacement", "velocity"))
         theta = np.full(self.N, exact(self.initial["temperature"])[()])
-        u[self.clamped], w[self.clamped], theta[self.cooled] = 0, 0, 0
+        u[self.prescribed_displacement], w[self.prescribed_displacement], theta[self.prescribed_temperature] = 0, 0, 0
         return State(u, w, theta)
 
     def march(self) -> Iterator[State]:

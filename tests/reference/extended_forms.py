@@ -34,7 +34,7 @@ def formulas(data: Any) -> bool:
 
 
 class Mesh:
-    """A box in bricks, cut along a diagonal as the scene says: nodes (N, d) doubles, cells (C, d+1), facets by part."""
+    """A box in cells, cut along a diagonal as the scene says: nodes (N, d) doubles, cells (C, d+1), facets by part."""
 
     def __init__(self, scene: Scene) -> None:
         table = scene.mesh

@@ -57,8 +57,8 @@ class Space:
     tangential: Any  # (n+1,) unknowns w_x of the bottom nodes, from left to right
     vertical: Any  # (n+1,) their w_y
     weights: Any  # (n+1,) integrals of their hat functions over the bottom
-    clamped: Any
-    cooled: Any
+    prescribed_displacement: Any
+    prescribed_temperature: Any
 
 
 @cache
@@ -165,10 +165,10 @@ def simulate(
     size = on.vector.N
     momentum = ops.inertia / k + ops.viscosity + k * ops.elasticity
     heat = ops.mass / k + ops.conduction + ops.exchange
-    system, held = momentum, on.clamped
+    system, held = momentum, on.prescribed_displacement
     if monolithic:
         system = sp.bmat([[momentum, -ops.expansion], [-ops.heating, heat]]).tocsr()
-        held = np.concatenate([on.clamped, size + on.cooled])
+        held = np.concatenate([on.prescribed_displacement, size + on.prescribed_temperature])
     u, w, theta = np.zeros(size), np.zeros(size), np.zeros(on.scalar.N)
     status = np.full(n + 1, OPEN)
     for _ in range(steps):
@@ -177,7 +177,11 @@ def simulate(
         right = np.concatenate([right, warmth]) if monolithic else right + ops.expansion @ theta
         y, status, friction, pressure = contact_step(on, system, right, held, -u[on.vertical], k, mu, status)
         w_star = w if coupling == "lagged" else y[:size]
-        theta = y[size:] if monolithic else solve(*condense(heat, warmth + ops.heating @ w_star, D=on.cooled))
+        theta = (
+            y[size:]
+            if monolithic
+            else solve(*condense(heat, warmth + ops.heating @ w_star, D=on.prescribed_temperature))
+        )
         w = y[:size]
         u = u + k * w
     plain = ops.inertia / RHO

@@ -28,7 +28,11 @@ from warmslip.simulation import signals
 
 PAGES = [page for page in sorted(DOCS.rglob("*.md")) if "```" in page.read_text()]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-STOPPED = ("data_not_finite:", "held_inside:", *(f"{name}:" for name in _core.Outcome.__members__ if name != "right"))
+STOPPED = (
+    "data_not_finite:",
+    "support_inside_foundation:",
+    *(f"{name}:" for name in _core.Outcome.__members__ if name != "completed"),
+)
 OWN_PROCESS = ("--petsc", "--log", "|", ">")
 
 
@@ -48,18 +52,18 @@ def said_by(command: str, folder: Path) -> tuple[str, int]:
             timeout=300,
         )
         return done.stdout, done.returncode
-    told = io.StringIO()
+    output = io.StringIO()
     with (
         patch.object(sys, "argv", shlex.split(command)),
         contextlib.chdir(folder),
-        contextlib.redirect_stdout(told),
-        contextlib.redirect_stderr(told),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(output),
     ):
         try:
             main.main()
         except SystemExit as end:
-            return told.getvalue(), int(end.code or 0)
-    return told.getvalue(), 0
+            return output.getvalue(), int(end.code or 0)
+    return output.getvalue(), 0
 
 
 def plain(text: str) -> str:
@@ -81,16 +85,16 @@ def commands(block: str) -> list[tuple[str, list[str]]]:
 def check(block: str, folder: Path) -> None:
     code = 0
     for command, expected in commands(block):
-        told, code = (f"{code}\n", 0) if command == "echo $?" else said_by(command, folder)
-        lines, at = [plain(line) for line in told.splitlines()], 0
+        output, code = (f"{code}\n", 0) if command == "echo $?" else said_by(command, folder)
+        lines, at = [plain(line) for line in output.splitlines()], 0
         for line in (plain(one) for one in expected if one.strip() != "..."):
             pattern = re.compile(re.escape(line).replace(r"\.\.\.", ".*"))
             while at < len(lines) and not pattern.fullmatch(lines[at]):
                 at += 1
-            assert at < len(lines), f"$ {command}\ndoes not say: {line}\nit says:\n{told}"
+            assert at < len(lines), f"$ {command}\ndoes not say: {line}\nit says:\n{output}"
         if command != "echo $?":
             fails = any(line.startswith(("error:", *STOPPED)) for line in expected)
-            assert (code != 0) == fails, f"$ {command}\nends with {code} and says:\n{told}"
+            assert (code != 0) == fails, f"$ {command}\nends with {code} and says:\n{output}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
@@ -109,12 +113,18 @@ def test_a_page_is_true(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_every_term_of_the_ledger_is_explained() -> None:
     text = (DOCS / "reference" / "core.md").read_text()
-    assert [term for term in _core.Ledger.terms if f"`{term}`" not in text] == []
+    assert [term for term in _core.Balances.terms if f"`{term}`" not in text] == []
 
 
 def test_every_outcome_is_explained() -> None:
     text = (DOCS / "messages.md").read_text()
-    for name in (*_core.Outcome.__members__, "data_not_finite", "held_inside", "law_failed", "interrupted"):
+    for name in (
+        *_core.Outcome.__members__,
+        "data_not_finite",
+        "support_inside_foundation",
+        "law_failed",
+        "interrupted",
+    ):
         assert f"`{name}`" in text, name
 
 
@@ -134,6 +144,6 @@ def test_outcomes_that_no_command_provokes(tmp_path: Path) -> None:
         (signals.Interruption, "agreed", lambda *_: (True, False), 130),
     ):
         with patch.object(where, name, stand_in):
-            told, ended = said_by(command, tmp_path)
-        assert plain(told) in page
+            output, ended = said_by(command, tmp_path)
+        assert plain(output) in page
         assert ended == code

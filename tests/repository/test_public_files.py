@@ -39,11 +39,11 @@ def test_readme_examples_run(
     monkeypatch.chdir(tmp_path)
     exec(compile(law, "README.md", "exec"), {})
     outcome, force = capsys.readouterr().out.split()
-    assert outcome == "right" and float(force) > 0.1
+    assert outcome == "completed" and float(force) > 0.1
     exec(compile(code, "README.md", "exec"), {})
-    said = capsys.readouterr().out.splitlines()
-    assert said[-2].startswith("right {'energy'")
-    assert "'u_V': 0.09" in said[-1] or "'u_V': 0.10" in said[-1], said[-1]
+    message = capsys.readouterr().out.splitlines()
+    assert message[-2].startswith("completed {'energy'")
+    assert "'u_V': 0.09" in message[-1] or "'u_V': 0.10" in message[-1], message[-1]
 
 
 def test_every_kind_of_figure_is_a_drawing() -> None:

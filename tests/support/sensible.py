@@ -47,5 +47,5 @@ def body(base: dict[str, Any], **keys: Any) -> Scene:
 
 def warnings(scene: Scene, **given: Any) -> list[str]:
     done = warmslip.run(scene, **given)
-    assert done.right, done.summary["failure"]
+    assert done.completed, done.summary["failure"]
     return list(done.summary["warnings"])

@@ -46,7 +46,7 @@ def stop_after(steps: int) -> Callable[[int, int, object], None]:
 def readable(path: Path) -> None:
     """What a killed run left is whole to its last second: as many steps in every series, and states of those."""
     with Trajectory(path) as t:
-        lengths = {len(values) for group in ("steps", "ledger") for values in t.series(group).values()}
+        lengths = {len(values) for group in ("steps", "balances") for values in t.series(group).values()}
         lengths |= {len(t.series("contact")[name]) for name in ("force", "displacement", "status", "gap")}
         assert len(lengths) == 1
         assert len(t.time) == len(t.u) == len(t.w) == len(t.theta) >= 1

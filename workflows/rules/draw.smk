@@ -118,7 +118,7 @@ rule figure_5:
 
 
 rule orders:
-    """Beside figure 5: orders with the bias of the self-reference removed, and those the problem is entitled to."""
+    """Beside figure 5: orders with the bias of the self-reference removed, and those the problem is expected to."""
     input:
         "<paper>/rates.csv",
         BOTH_STUDIES,

@@ -4,7 +4,7 @@ STUDIES = expand("<runs>/studies/{case}.csv", case=CASES)
 
 
 rule rates:
-    """Observed, bias-corrected and entitled orders of every study."""
+    """Observed, bias-corrected and expected orders of every study."""
     input:
         STUDIES,
     output:

@@ -6,7 +6,8 @@ namespace warmslip {
 template <int d>
 bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   const auto count = problem.points.size();
-  if (!by_status(problem) || count > static_cast<std::size_t>(options_.enumerate_points)) return false;
+  if (!tangent_depends_on_status_only(problem) || count > static_cast<std::size_t>(options_.enumerate_points))
+    return false;
   for (const ContactLaw& law : problem.laws)  // a bound that is there without pressure has more statuses
     if (law.friction.cohesion > 0) return false;
   const Eigen::Index all = compliance_.rows(), m = rigid_.count();
@@ -15,7 +16,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
   Eigen::VectorXd loads = Eigen::VectorXd::Zero(all + m);
   if (m > 0) {
     system.bottomLeftCorner(m, all) = rigid_.loads.transpose();
-    system.bottomRightCorner(m, m) = give_ * rigid_.inertia;
+    system.bottomRightCorner(m, m) = rigid_unit_ * rigid_.inertia;
     loads.tail(m) = problem.rigid - rigid_.loads.transpose() * none;
   }
   const bool unsupported = solution.unsupported;
@@ -29,7 +30,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
       const Eigen::Vector2d nu = point.normal.template head<2>(), tau(-nu[1], nu[0]);
       const auto choice = code >> (2 * i) & 3;  // 0 open, 1 stick, 2 and 3 slip
       const ContactLaw& law = problem.law(i);
-      const OwnCompliance scales = own(problem, i);
+      const PointCompliance scales = diagonal_block(problem, i);
       const auto per = [](double compliance) { return compliance > 0 ? 1 / compliance : 1.0; };
       // by_force force + by_velocity velocity = right, in units of force
       if (choice == 0 || !law.compliance.rigid()) {
@@ -49,7 +50,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
       }
     }
     system.topLeftCorner(all, all) = by_force - by_velocity * compliance_;
-    if (m > 0) system.topRightCorner(all, m) = give_ * by_velocity * rigid_.motions;
+    if (m > 0) system.topRightCorner(all, m) = rigid_unit_ * by_velocity * rigid_.motions;
     loads.head(all) = right - by_velocity * problem.free;
     const Eigen::FullPivLU<Eigen::MatrixXd> lu(system);
     const Eigen::VectorXd found = lu.solve(loads);
@@ -60,7 +61,7 @@ bool ContactSolver<d>::enumerate(const ContactProblem<d>& problem, ContactSoluti
     const Linearisation at = linearise(problem, solution.added, solution.rigid);
     solution.velocity = at.velocity;
     if (!accept(problem, solution)) continue;
-    if (m > 0 && !held(problem, solution)) continue;
+    if (m > 0 && !is_supported(problem, solution)) continue;
     solution.status.clear();
     for (const auto& point : at.points) solution.status.push_back(point.status);
     return true;

@@ -24,7 +24,7 @@ Eigen::VectorXd beyond_known(const ContactProblem<d>& problem, const Eigen::Vect
 
 // Whether statuses alone make the tangent.
 template <int d>
-bool by_status(const ContactProblem<d>& problem) {
+bool tangent_depends_on_status_only(const ContactProblem<d>& problem) {
   return d == 2 && std::all_of(problem.laws.begin(), problem.laws.end(),
                                [](const ContactLaw& law) { return law.piecewise_linear(); });
 }
@@ -39,15 +39,15 @@ struct ContactSolver<d>::Linearisation {
 // Other scales and limits for as long as it lives, and a tangent of their own; also when memory runs out on the way.
 template <int d>
 struct ContactSolver<d>::Trial {
-  explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.forget(); }
+  explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.clear_cache(); }
   ~Trial() {
     solver.carries_ = false;
-    solver.boldness_ = 1;
-    solver.share_ = 0;
-    solver.leash_ = 0;
-    solver.lean_ = 0;
+    solver.tangential_scale_ = 1;
+    solver.stiff_proximal_ = 0;
+    solver.spring_ = 0;
+    solver.lent_mass_ = 0;
     solver.options_ = options;
-    solver.forget();
+    solver.clear_cache();
   }
   Trial(const Trial&) = delete;
   ContactSolver& solver;

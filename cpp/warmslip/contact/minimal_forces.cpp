@@ -50,12 +50,12 @@ struct Sharing {
 template <int d>
 std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactSolution<d>& solution,
                                 double tolerance) {
-  double fastest = 0, reach = 0, largest = 0;
+  double max_speed = 0, reach = 0, largest = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const ContactPoint<d>& point = problem.points[i];
     const auto row = static_cast<Eigen::Index>(i) * d;
     const Point<d> free = problem.free.template segment<d>(row), w = solution.velocity.template segment<d>(row);
-    fastest = std::max({fastest, free.norm(), w.norm()});
+    max_speed = std::max({max_speed, free.norm(), w.norm()});
     largest = std::max(largest, solution.force.template segment<d>(row).norm());
     reach = std::max(reach, point.displacement.norm() + std::abs(point.gap) + problem.step * (free.norm() + w.norm()));
   }
@@ -71,7 +71,7 @@ std::vector<Sharing<d>> sharing(const ContactProblem<d>& problem, const ContactS
     const double least = point.weight * friction.bound(0, speed).value,
                  bound = point.weight * friction.bound(pressure, speed).value;
     // the power that will be missing is at most twice bound times speed
-    const bool rests = friction.regularisation == 0 && bound > 0 && speed <= tolerance * fastest;
+    const bool rests = friction.regularisation == 0 && bound > 0 && speed <= tolerance * max_speed;
     const double r = point.penetration + problem.step * w.dot(point.normal);
     const bool pressed = law.compliance.rigid() && !point.prescribed && std::abs(r) <= tolerance * reach &&
                          !friction.custom && friction.limit == unlimited && (rests || d == 2 || bound == 0);
@@ -143,23 +143,24 @@ struct Dual {
 }  // namespace
 
 template <int d>
-bool share_least(const ContactProblem<d>& problem, const Shape& shape, double tolerance, ContactSolution<d>& solution) {
+bool minimal_forces(const ContactProblem<d>& problem, const Shape& shape, double tolerance,
+                    ContactSolution<d>& solution) {
   const std::vector<Sharing<d>> points = sharing(problem, solution, tolerance);
   if (points.empty()) return true;
   for (const auto& q : points)
     if (q.rests) solution.status[static_cast<std::size_t>(q.point)] = Status::stick;
   Eigen::VectorXd asked = Eigen::VectorXd::Zero(shape.cols() * d);
   const Dual<d> dual{points, shape, asked};
-  double widest = 0;
+  double max_bound = 0;
   for (const auto& q : points) {
     const Point<d> force = solution.force.template segment<d>(q.point * d);
     dual.add(q, q.part(force), asked);
-    widest = std::max({widest, q.bound, q.part(force).norm()});
+    max_bound = std::max({max_bound, q.bound, q.part(force).norm()});
   }
   double heaviest = 0;
   for (const auto& q : points) heaviest = std::max(heaviest, q.weight);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(asked.size()), gradient = dual.gradient(y);
-  const double enough = 8 * std::numeric_limits<double>::epsilon() * widest, least = 1e-12 * heaviest;
+  const double enough = 8 * std::numeric_limits<double>::epsilon() * max_bound, least = 1e-12 * heaviest;
   double damping = least;  // where nothing rests, or forces are at their bounds, the function is flat
   for (int step = 0; step < 500 && gradient.cwiseAbs().maxCoeff() > enough; ++step) {
     const Eigen::VectorXd change =
@@ -173,7 +174,7 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
     y += change;
     gradient = next;
   }
-  if (!(gradient.cwiseAbs().maxCoeff() <= 0.5 * tolerance * widest)) return false;
+  if (!(gradient.cwiseAbs().maxCoeff() <= 0.5 * tolerance * max_bound)) return false;
   for (const auto& q : points) {
     auto force = solution.force.template segment<d>(q.point * d);
     const Point<d> change = q.nearest(dual.at(q, y)).force - q.part(force);
@@ -183,7 +184,7 @@ bool share_least(const ContactProblem<d>& problem, const Shape& shape, double to
   return true;
 }
 
-template bool share_least<2>(const ContactProblem<2>&, const Shape&, double, ContactSolution<2>&);
-template bool share_least<3>(const ContactProblem<3>&, const Shape&, double, ContactSolution<3>&);
+template bool minimal_forces<2>(const ContactProblem<2>&, const Shape&, double, ContactSolution<2>&);
+template bool minimal_forces<3>(const ContactProblem<3>&, const Shape&, double, ContactSolution<3>&);
 
 }  // namespace warmslip

@@ -29,7 +29,7 @@ bool singular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
 
 // The compliance of a point by itself; zero where its motion is given.
 template <int d>
-OwnCompliance ContactSolver<d>::own(const ContactProblem<d>& problem, std::size_t i) const {
+PointCompliance ContactSolver<d>::diagonal_block(const ContactProblem<d>& problem, std::size_t i) const {
   const Point<d>& nu = problem.points[i].normal;
   const auto row = static_cast<Eigen::Index>(i) * d;
   Tensor2<d> block = compliance_.template block<d, d>(row, row);
@@ -40,7 +40,7 @@ OwnCompliance ContactSolver<d>::own(const ContactProblem<d>& problem, std::size_
   const double half = across.trace() / 2,
                largest =
                    d == 2 ? across.trace() : half + std::sqrt(std::max(0.0, across.squaredNorm() / 2 - half * half));
-  return {problem.step * nu.dot(block * nu), largest / boldness_};
+  return {problem.step * nu.dot(block * nu), largest / tangential_scale_};
 }
 
 // A point whose motion is given: its force follows from the law, and moves nothing.
@@ -80,8 +80,9 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactP
   at.value.resize(force.size() + rigid_.count());
   at.value.head(force.size()) = force;
   if (rigid_.count() > 0) {
-    at.velocity.noalias() += give_ * rigid_.motions * rigid;
-    at.value.tail(rigid_.count()) = rigid_.loads.transpose() * added + give_ * rigid_.inertia * rigid - problem.rigid;
+    at.velocity.noalias() += rigid_unit_ * rigid_.motions * rigid;
+    at.value.tail(rigid_.count()) =
+        rigid_.loads.transpose() * added + rigid_unit_ * rigid_.inertia * rigid - problem.rigid;
   }
   return at;
 }
@@ -89,11 +90,12 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactP
 // The law's residual at the velocities of `at` and the forces in its value, with own compliances that are so many times
 // smaller.
 template <int d>
-void ContactSolver<d>::obey(const ContactProblem<d>& problem, double firmness, Linearisation& at) const {
+void ContactSolver<d>::apply_regularised_law(const ContactProblem<d>& problem, double firmness,
+                                             Linearisation& at) const {
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i) * d;
-    const OwnCompliance scales = own(problem, i);
+    const PointCompliance scales = diagonal_block(problem, i);
     if (scales.normal > 0 && scales.tangential > 0) {
       at.points[i] = residual<d>(problem.law(i), problem.points[i], problem.step,
                                  {scales.normal / firmness, scales.tangential / firmness},
@@ -111,30 +113,30 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
                                                                      const Eigen::VectorXd& added,
                                                                      const Eigen::VectorXd& rigid) const {
   Linearisation at = motion(problem, added, rigid);
-  obey(problem, 1, at);
+  apply_regularised_law(problem, 1, at);
   return at;
 }
 
 template <int d>
 void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisation& at, ContactSolution<d>& solution) {
   solution.unsupported = unsupported_;
-  if (by_status(problem) && at.key == factored_) return;  // same statuses, same tangent
-  factored_.clear();                                      // until it is whole: memory may run out on the way
-  closed_.clear();
+  if (tangent_depends_on_status_only(problem) && at.key == tangent_status_) return;  // same statuses, same tangent
+  tangent_status_.clear();  // until it is whole: memory may run out on the way
+  active_points_.clear();
   Eigen::Index n = 0;
   for (std::size_t i = 0; i < at.points.size(); ++i) {
     if (at.points[i].away && at.points[i].smooth) continue;
-    closed_.push_back({static_cast<Eigen::Index>(i) * d, n, sought<d>(at.points[i], problem.points[i].normal)});
-    n += closed_.back().size();
+    active_points_.push_back({static_cast<Eigen::Index>(i) * d, n, sought<d>(at.points[i], problem.points[i].normal)});
+    n += active_points_.back().size();
   }
   const Eigen::Index m = rigid_.count();
   Eigen::MatrixXd tangent(n + m, n + m);
-  const auto at_block = [&](const Closed& row, const Closed& column) {
+  const auto at_block = [&](const ActivePoint& row, const ActivePoint& column) {
     return tangent.block(row.at, column.at, row.size(), column.size());
   };
-  for (const Closed& row : closed_) {
+  for (const ActivePoint& row : active_points_) {
     const PointResidual<d>& point = at.points[static_cast<std::size_t>(row.row / d)];
-    for (const Closed& column : closed_) {
+    for (const ActivePoint& column : active_points_) {
       const auto give = compliance_.template block<d, d>(row.row, column.row);
       if (row.size() == d && column.size() == d)  // of fixed sizes, and quick
         tangent.template block<d, d>(row.at, column.at).noalias() = -point.by_velocity * give;
@@ -145,26 +147,27 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
     for (Eigen::Index j = 0; j < m; ++j) {
       const Point<d> motion = rigid_.motions.col(j).template segment<d>(row.row),
                      load = rigid_.loads.col(j).template segment<d>(row.row);
-      tangent.col(n + j).segment(row.at, row.size()) = give_ * row.basis.transpose() * (point.by_velocity * motion);
+      tangent.col(n + j).segment(row.at, row.size()) =
+          rigid_unit_ * row.basis.transpose() * (point.by_velocity * motion);
       tangent.row(n + j).segment(row.at, row.size()) = load.transpose() * row.basis;
     }
   }
-  tangent.bottomRightCorner(m, m) = give_ * rigid_.inertia;
-  tangent.bottomRightCorner(m, m).diagonal().array() += lean_;
+  tangent.bottomRightCorner(m, m) = rigid_unit_ * rigid_.inertia;
+  tangent.bottomRightCorner(m, m).diagonal().array() += lent_mass_;
   // anew: Eigen's matrices lose their memory when they grow and cannot
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
   solution.unsupported = unsupported_ = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
-  if (leash_ > 0) {
+  if (spring_ > 0) {
     Eigen::MatrixXd weightless = tangent;
-    weightless.bottomRightCorner(m, m) -= give_ * rigid_.inertia;
+    weightless.bottomRightCorner(m, m) -= rigid_unit_ * rigid_.inertia;
     if (singular(Eigen::PartialPivLU<Eigen::MatrixXd>(weightless))) {
-      tangent.bottomRightCorner(m, m).diagonal().array() += give_ * leash_;
+      tangent.bottomRightCorner(m, m).diagonal().array() += rigid_unit_ * spring_;
       tangent_.compute(tangent);  // the load then moves the body until something holds it
     }
   }
-  factored_ = at.key;
+  tangent_status_ = at.key;
   ++solution.factorizations;
 }
 
@@ -181,7 +184,7 @@ Tensor2<d> ContactSolver<d>::shared(const ContactProblem<d>& problem, const Poin
   const ContactLaw& law = problem.law(i);
   if (at.status == Status::stick && law.friction.regularisation == 0)
     out += options_.proximal * (Tensor2<d>::Identity() - normal);
-  const double share = law.compliance.rigid() ? options_.proximal : share_;
+  const double share = law.compliance.rigid() ? options_.proximal : stiff_proximal_;
   if (at.touching) out += std::max(0.0, share - nu.dot(at.by_force * nu)) * normal;
   return out;
 }
@@ -194,7 +197,7 @@ template <int d>
 Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
   const Eigen::Index m = rigid_.count(), all = compliance_.rows(), n = tangent_.rows() - m;
   Eigen::VectorXd out = -at.value;
-  for (const Closed& here : closed_) {
+  for (const ActivePoint& here : active_points_) {
     auto rest = out.template segment<d>(here.row);
     if (here.size() == d)
       rest.setZero();
@@ -205,7 +208,7 @@ Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
   Eigen::VectorXd right = Eigen::VectorXd::Zero(n + m);
   const bool any = !out.isZero(0);
   const Eigen::VectorXd change = any ? compliance_ * out.head(all) : Eigen::VectorXd();  // of minus the velocities
-  for (const Closed& here : closed_) {
+  for (const ActivePoint& here : active_points_) {
     const PointResidual<d>& point = at.points[static_cast<std::size_t>(here.row / d)];
     Point<d> rest = -at.value.template segment<d>(here.row);
     if (any) rest += point.by_velocity * change.template segment<d>(here.row);
@@ -214,7 +217,7 @@ Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
   right.tail(m) = -at.value.tail(m);
   if (any && m > 0) right.tail(m) -= rigid_.loads.transpose() * out.head(all);
   if (n + m > 0) right = tangent_.solve(right);
-  for (const Closed& here : closed_)
+  for (const ActivePoint& here : active_points_)
     out.template segment<d>(here.row) += here.basis * right.segment(here.at, here.size());
   out.tail(m) = right.tail(m);
   return out;
@@ -258,8 +261,8 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     if (step >= options_.newton_steps && !best.converged) return false;
     factor(problem, at, solution);
     const Eigen::VectorXd change = direction(at);
-    if (!change.allFinite() || (solution.unsupported && leash_ == 0)) {
-      factored_.clear();
+    if (!change.allFinite() || (solution.unsupported && spring_ == 0)) {
+      tangent_status_.clear();
       if (best.converged) break;
       return false;
     }
@@ -316,15 +319,15 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
   if (!response.allFinite() || solution.unsupported) return false;
   solution.added = response.head(all);
   solution.force = problem.known_force + solution.added;
-  solution.rigid = give_ * response.tail(rigid_.count());
+  solution.rigid = rigid_unit_ * response.tail(rigid_.count());
   return true;
 }
 
 #define WARMSLIP_INSTANTIATE(d)                                                                                       \
-  template OwnCompliance ContactSolver<d>::own(const ContactProblem<d>&, std::size_t) const;                          \
+  template PointCompliance ContactSolver<d>::diagonal_block(const ContactProblem<d>&, std::size_t) const;             \
   template ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactProblem<d>&, const Eigen::VectorXd&, \
                                                                     const Eigen::VectorXd&) const;                    \
-  template void ContactSolver<d>::obey(const ContactProblem<d>&, double, Linearisation&) const;                       \
+  template void ContactSolver<d>::apply_regularised_law(const ContactProblem<d>&, double, Linearisation&) const;      \
   template ContactSolver<d>::Linearisation ContactSolver<d>::linearise(                                               \
       const ContactProblem<d>&, const Eigen::VectorXd&, const Eigen::VectorXd&) const;                                \
   template void ContactSolver<d>::factor(const ContactProblem<d>&, const Linearisation&, ContactSolution<d>&);        \

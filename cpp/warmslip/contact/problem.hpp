@@ -16,7 +16,7 @@ struct ContactOptions {
 };
 
 /// Which safeguard produced the answer.
-enum class Stage : std::int8_t { none, newton, restart, fixed_point, enumeration };
+enum class Stage : std::int8_t { none, newton, restart, tresca_fixed_point, enumeration };
 
 template <int d>
 struct ContactProblem {

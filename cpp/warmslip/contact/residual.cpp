@@ -15,7 +15,7 @@ double distance(const NormalCompliance& law, double pressure, double r) {
     return slope > 0 ? std::abs(pressure - law.pressure(r)) / slope : unlimited;
   }
   if (law.stiffness == 0) return unlimited;
-  if (law.at_limit(pressure)) return pressure > law.most ? unlimited : std::max(law.deepest_rise() - r, 0.0);
+  if (law.at_limit(pressure)) return pressure > law.pressure_limit ? unlimited : std::max(law.deepest_rise() - r, 0.0);
   return std::abs(r - law.penetration(pressure, r));
 }
 
@@ -23,7 +23,7 @@ double distance(const NormalCompliance& law, double pressure, double r) {
 
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
-  double largest = 0, reach = 0, fastest = 0, widest = 0;
+  double largest = 0, reach = 0, max_speed = 0, max_bound = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
     if (point.prescribed) continue;
@@ -34,14 +34,14 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
     // the velocity is what the contact force leaves of the free one
     reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
-    fastest = std::max({fastest, free.norm(), w.norm()});
+    max_speed = std::max({max_speed, free.norm(), w.norm()});
     largest = std::max(largest, f.norm());
-    widest = std::max(widest,
-                      point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
+    max_bound = std::max(
+        max_bound, point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
   }
-  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(fastest))
+  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(max_speed))
     return std::numeric_limits<double>::infinity();
-  largest = std::max(largest, widest);
+  largest = std::max(largest, max_bound);
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
@@ -69,7 +69,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
     const double normal = off == 0 ? 0 : std::min(of_forces(off), apart);
     const double friction =
-        friction_defect<d>(law.friction, bound, f_tau, w_tau, widest > 0 ? widest : largest, fastest);
+        friction_defect<d>(law.friction, bound, f_tau, w_tau, max_bound > 0 ? max_bound : largest, max_speed);
     if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
     worst = std::max({worst, normal, friction});
   }

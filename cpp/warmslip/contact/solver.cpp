@@ -31,8 +31,8 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
     throw std::invalid_argument("the compliance must be square with d rows a contact point");
   if (rigid_.motions.size() == 0) rigid_.motions.resize(compliance_.rows(), rigid_.count());
   if (rigid_.loads.size() == 0) rigid_.loads = rigid_.motions;
-  spectral_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
-  give_ = spectral_ > 0 ? spectral_ : 1;
+  compliance_norm_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
+  rigid_unit_ = compliance_norm_ > 0 ? compliance_norm_ : 1;
   carried_ = Eigen::MatrixXd::Zero(d, compliance_.rows());
   if (rigid_.count() == 0 || rigid_.inertia.isZero(0)) return;
   const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.loads.transpose());
@@ -56,7 +56,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     solution.rigid.setZero();
     if (massive)
       solution.rigid =
-          (give_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.loads.transpose() * solution.added);
+          (rigid_unit_ * rigid_.inertia).fullPivLu().solve(problem.rigid - rigid_.loads.transpose() * solution.added);
   };
   const auto attempt = [&](Stage stage, auto&& method) {
     if (solution.converged) return;
@@ -84,37 +84,37 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       });
   if (rigid_.count() > 0)  // it may have to come to the foundation first
     for (const bool line_search : {true, false})
-      attempt(Stage::restart, [&] { return approach(problem, line_search, solution); });
-  if (rigid_.count() > 0 && !massive) attempt(Stage::restart, [&] { return draw(problem, solution); });
+      attempt(Stage::restart, [&] { return newton_with_spring(problem, line_search, solution); });
+  if (rigid_.count() > 0 && !massive) attempt(Stage::restart, [&] { return newton_with_lent_mass(problem, solution); });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
   // again from no force, with other scales of the tangential rows
-  for (const double boldness : {1.0, 0.1, 10.0, 0.01})
+  for (const double tangential_scale : {1.0, 0.1, 10.0, 0.01})
     attempt(Stage::restart, [&] {
       const Trial trial(*this);
-      boldness_ = boldness;
-      share_ = options_.proximal;
+      tangential_scale_ = tangential_scale;
+      stiff_proximal_ = options_.proximal;
       solution.added = none;
       move();
       return newton(problem, true, solution);
     });
-  attempt(Stage::fixed_point, [&] {
+  attempt(Stage::tresca_fixed_point, [&] {
     const Trial trial(*this);
     const bool unsupported = solution.unsupported;
     move();
-    if (fixed_point(problem, solution) && held(problem, solution)) return true;
+    if (tresca_fixed_point(problem, solution) && is_supported(problem, solution)) return true;
     solution.unsupported = unsupported || solution.unsupported;
     return false;
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
-  if (massive && give_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(problem, solution)))
-    settle_down(problem, solution);
+  if (massive && rigid_unit_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(problem, solution)))
+    stick_at_one_point(problem, solution);
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   if (solution.converged && rigid_.count() > 0 && !massive) {
     factor(problem, linearise(problem, solution.added, solution.rigid), solution);
     solution.undetermined = solution.unsupported;
   }
   solution.unsupported = solution.unsupported && !solution.converged;
-  solution.rigid *= give_;
+  solution.rigid *= rigid_unit_;
   return solution;
 }
 

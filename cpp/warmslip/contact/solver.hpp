@@ -23,7 +23,7 @@ class ContactSolver {
   bool respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change, ContactSolution<d>& solution);
 
   /// Drops the remembered tangent: the next solve does what a new solver would, to the last bit.
-  void forget() { factored_.clear(); }
+  void clear_cache() { tangent_status_.clear(); }
   const Eigen::MatrixXd& compliance() const { return compliance_; }
   const RigidCoupling& coupling() const { return rigid_; }
 
@@ -31,7 +31,7 @@ class ContactSolver {
   struct Linearisation;
   struct Trial;
   // A point in the dense tangent, with as many components of its force as are not known to be 0.
-  struct Closed {
+  struct ActivePoint {
     using Basis = Eigen::Matrix<double, d, Eigen::Dynamic, Eigen::ColMajor, d, d>;
     Eigen::Index row, at;  // its first component among all, and in the tangent
     Basis basis;           // of the force that is sought, orthonormal
@@ -40,7 +40,7 @@ class ContactSolver {
   };
   Linearisation motion(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                        const Eigen::VectorXd& rigid) const;
-  void obey(const ContactProblem<d>& problem, double firmness, Linearisation& at) const;
+  void apply_regularised_law(const ContactProblem<d>& problem, double firmness, Linearisation& at) const;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;
@@ -50,31 +50,31 @@ class ContactSolver {
   bool newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   bool convex(const ContactProblem<d>& problem, const Eigen::VectorXd& centre, double firmness,
               ContactSolution<d>& solution);
-  bool held(const ContactProblem<d>& problem, ContactSolution<d>& solution);
-  bool fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  bool is_supported(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  bool tresca_fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);
-  void glue(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
-  bool approach(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
-  void settle_down(const ContactProblem<d>& problem, ContactSolution<d>& solution);
-  bool draw(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  void assume_all_stick(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
+  bool newton_with_spring(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
+  void stick_at_one_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  bool newton_with_lent_mass(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
-  OwnCompliance own(const ContactProblem<d>& problem, std::size_t point) const;
+  PointCompliance diagonal_block(const ContactProblem<d>& problem, std::size_t point) const;
 
   Eigen::MatrixXd compliance_;
   ContactOptions options_;
   RigidCoupling rigid_;
-  double boldness_ = 1;         // of the tangential rows, against the reciprocal of the point's own compliance
-  Eigen::MatrixXd carried_;     // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
-  double share_ = 0;            // > 0: pressed points share their force on a stiff foundation as on a rigid one
-  double leash_ = 0;            // > 0: force per velocity that holds a body without mass while nothing else does
-  double lean_ = 0;             // > 0: an inertia that draws the rigid motions to where they were, dimensionless
-  bool carries_ = false;        // whether a point's own compliance includes the rigid motions
-  double give_ = 1;             // velocity per force, the unit of the rigid motions
-  double spectral_ = 0;         // largest row sum of |compliance|, a bound on its eigenvalues
-  std::vector<int> factored_;   // statuses the tangent below belongs to
-  bool unsupported_ = false;    // whether it leaves a rigid motion undetermined
-  std::vector<Closed> closed_;  // its rows: the points in contact
+  double tangential_scale_ = 1;      // of the tangential rows, against the reciprocal of the point's own compliance
+  Eigen::MatrixXd carried_;          // (d, d points): blocks of motions inertia^-1 motions^T on the diagonal
+  double stiff_proximal_ = 0;        // > 0: pressed points share their force on a stiff foundation as on a rigid one
+  double spring_ = 0;                // > 0: force per velocity that holds a body without mass while nothing else does
+  double lent_mass_ = 0;             // > 0: an inertia that draws the rigid motions to where they were, dimensionless
+  bool carries_ = false;             // whether a point's own compliance includes the rigid motions
+  double rigid_unit_ = 1;            // velocity per force, the unit of the rigid motions
+  double compliance_norm_ = 0;       // largest row sum of |compliance|, a bound on its eigenvalues
+  std::vector<int> tangent_status_;  // statuses the tangent below belongs to
+  bool unsupported_ = false;         // whether it leaves a rigid motion undetermined
+  std::vector<ActivePoint> active_points_;  // its rows: the points in contact
   Eigen::PartialPivLU<Eigen::MatrixXd> tangent_;
 };
 

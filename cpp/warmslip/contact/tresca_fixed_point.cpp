@@ -40,10 +40,10 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
   const Eigen::VectorXd motions_before = solution.rigid;
   const auto unmet = [&](const Eigen::VectorXd& added, const Eigen::VectorXd& rigid) {
     Linearisation at = motion(problem, added, rigid);
-    at.value.tail(motions) += lean_ * (rigid - motions_before);
+    at.value.tail(motions) += lent_mass_ * (rigid - motions_before);
     const Eigen::VectorXd force = at.value.head(all);
     at.value.head(all) = centre;
-    obey(problem, firmness, at);
+    apply_regularised_law(problem, firmness, at);
     at.value.head(all) += force - centre;
     for (auto& point : at.points) point.by_force.setIdentity();
     return at;
@@ -56,9 +56,9 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
     if (!change.allFinite()) return false;
     ++solution.iterations;
     Eigen::VectorXd moved = -compliance_ * change.head(all);
-    if (motions > 0) moved += give_ * rigid_.motions * change.tail(motions);
+    if (motions > 0) moved += rigid_unit_ * rigid_.motions * change.tail(motions);
     const auto slope = [&](const Linearisation& there) {
-      return give_ * change.tail(motions).dot(there.value.tail(motions)) - there.value.head(all).dot(moved);
+      return rigid_unit_ * change.tail(motions).dot(there.value.tail(motions)) - there.value.head(all).dot(moved);
     };
     const double before = slope(at);
     double low = 0, high = 1, length = 1;
@@ -80,11 +80,11 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
   return true;
 }
 
-// Friction bounds frozen, the step is convex: draw near its solution, move the bounds half way, repeat; Newton finishes
-// from there. An augmented Lagrangian for the forces and a fixed point for the bounds at once, indifferent to
-// stiffness.
+// Friction bounds frozen, the step is convex: newton_with_lent_mass near its solution, move the bounds half way,
+// repeat; Newton finishes from there. An augmented Lagrangian for the forces and a fixed point for the bounds at once,
+// indifferent to stiffness.
 template <int d>
-bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+bool ContactSolver<d>::tresca_fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
   const double proximal = options_.proximal;
   ContactProblem<d> frozen = problem;
   frozen.laws.clear();
@@ -101,10 +101,10 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     if (best.converged && best.law_residual <= 1e-2 * options_.tolerance) break;
     const double firmness = firmness_of(step);
     freeze(problem, force, velocity, step == 0 ? 1.0 : 0.5, frozen);
-    forget();
-    lean_ = 1 / firmness;
+    clear_cache();
+    lent_mass_ = 1 / firmness;
     const bool solved = convex(frozen, force, firmness, solution);
-    lean_ = 0;
+    lent_mass_ = 0;
     if (!solved) break;
     force = total(problem, solution.added);
     velocity = motion(problem, solution.added, solution.rigid).velocity;
@@ -112,8 +112,9 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
     finished.force = force;
     finished.velocity = velocity;
     if (!accept(problem, finished) && step % 10 != 9 && (step & (step + 1)) != 0) continue;
-    for (const double part : {1.0, 1e-3}) {  // near the solution less has to draw points to the share they had
-      forget();
+    for (const double part :
+         {1.0, 1e-3}) {  // near the solution less has to newton_with_lent_mass points to the share they had
+      clear_cache();
       finished = solution;
       options_.proximal = part * proximal;
       const bool done = newton(problem, part == 1, finished);
@@ -134,7 +135,7 @@ bool ContactSolver<d>::fixed_point(const ContactProblem<d>& problem, ContactSolu
   return true;
 }
 
-template bool ContactSolver<2>::fixed_point(const ContactProblem<2>&, ContactSolution<2>&);
-template bool ContactSolver<3>::fixed_point(const ContactProblem<3>&, ContactSolution<3>&);
+template bool ContactSolver<2>::tresca_fixed_point(const ContactProblem<2>&, ContactSolution<2>&);
+template bool ContactSolver<3>::tresca_fixed_point(const ContactProblem<3>&, ContactSolution<3>&);
 
 }  // namespace warmslip

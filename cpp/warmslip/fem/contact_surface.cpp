@@ -44,7 +44,7 @@ bool dependent(const Eigen::SparseMatrix<double, Eigen::RowMajor>& rows) {
 template <int d>
 ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem) : layout_(layout) {
   const Mesh<d>& mesh = layout.mesh();
-  const std::set<Index> clamped = nodes_of(mesh, problem.clamped);
+  const std::set<Index> fixed = nodes_of(mesh, problem.prescribed_displacement);
   std::vector<std::string> touching;
   for (const ContactPart& contact : problem.contacts)
     if (contact.law) touching.push_back(contact.part);
@@ -55,7 +55,7 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   }
   free_ = Eigen::VectorXd::Ones(nodes() * d);
   for (Eigen::Index i = 0; i < nodes(); ++i)
-    if (clamped.contains(nodes_[static_cast<std::size_t>(i)])) free_.segment<d>(i * d).setZero();
+    if (fixed.contains(nodes_[static_cast<std::size_t>(i)])) free_.segment<d>(i * d).setZero();
 
   std::vector<Point<d>> positions, normals;
   std::vector<double> weights;
@@ -137,9 +137,9 @@ void ContactSurface<d>::add(const Eigen::VectorXd& nodal, Vec v) const {
   PetscInt begin, end;
   WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
   const auto indices = unknowns(d);
-  Values own(v);
+  Values owned(v);
   for (std::size_t i = 0; i < indices.size(); ++i)
-    if (indices[i] >= begin && indices[i] < end) (*own)[indices[i] - begin] += nodal[static_cast<Eigen::Index>(i)];
+    if (indices[i] >= begin && indices[i] < end) (*owned)[indices[i] - begin] += nodal[static_cast<Eigen::Index>(i)];
 }
 
 template <int d>
@@ -165,9 +165,9 @@ Eigen::VectorXd ContactSurface<d>::nodal_values(Vec v) const {
   const auto indices = block_size(v) == 1 ? global_nodes() : unknowns(d);
   Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(indices.size()));
   {
-    Values own(v);
+    Values owned(v);
     for (std::size_t i = 0; i < indices.size(); ++i)
-      if (indices[i] >= begin && indices[i] < end) values[static_cast<Eigen::Index>(i)] = (*own)[indices[i] - begin];
+      if (indices[i] >= begin && indices[i] < end) values[static_cast<Eigen::Index>(i)] = (*owned)[indices[i] - begin];
   }
   return layout_.sum(std::move(values));
 }
@@ -229,7 +229,7 @@ ContactFlow contact_flow(const Problem<d>& problem, const ContactSurface<d>& sur
     const Point<d> here = force.segment<d>(i * d), slip = velocity - velocity.dot(nu) * nu;
     const double weight = surface.weights()[i], pressure = std::max(here.dot(nu), 0.0) / weight;
     flow.conductance[i] = weight * part.heat.per_pressure * pressure;
-    flow.friction[i] = slip.norm() > rest ? part.heat.friction_share * here.dot(slip) : 0;
+    flow.friction[i] = slip.norm() > rest ? part.heat.share * here.dot(slip) : 0;
   }
   return flow;
 }

@@ -239,9 +239,9 @@ Eigen::VectorXd Layout<d>::gather(Vec v) const {
   const Eigen::Index block = block_size(v);
   Eigen::VectorXd all = Eigen::VectorXd::Zero(mesh_->nodes.rows() * block);
   {
-    Values own(v);
+    Values owned(v);
     for (PetscInt i = 0; i < owned_; ++i)
-      all.segment(mesh_nodes_[static_cast<std::size_t>(i)] * block, block) = (*own).segment(i * block, block);
+      all.segment(mesh_nodes_[static_cast<std::size_t>(i)] * block, block) = (*owned).segment(i * block, block);
   }
   return sum(std::move(all));  // every node has one owner
 }
@@ -253,9 +253,9 @@ void Layout<d>::distribute(const Eigen::VectorXd& values, Vec v) const {
     throw std::invalid_argument("expected " + std::to_string(block) + " values for each of the " +
                                 std::to_string(mesh_->nodes.rows()) + " nodes, got " + std::to_string(values.size()) +
                                 " in all");
-  Values own(v);
+  Values owned(v);
   for (PetscInt i = 0; i < owned_; ++i)
-    (*own).segment(i * block, block) = values.segment(mesh_nodes_[static_cast<std::size_t>(i)] * block, block);
+    (*owned).segment(i * block, block) = values.segment(mesh_nodes_[static_cast<std::size_t>(i)] * block, block);
 }
 
 template <int d>

@@ -129,7 +129,7 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
   if (has(&M::viscosity))
     viscosity = assemble(layout, problem, d, d,
                          [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.viscosity)); });
-  if (problem.moves()) clamped = fixed(layout, problem.clamped, d);
+  if (problem.moves()) prescribed_displacement = fixed(layout, problem.prescribed_displacement, d);
   if (!problem.conducts()) return;
   mass = assemble(layout, problem, 1, 1,
                   [&](const S& s, const M& m) { return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval(); });
@@ -149,14 +149,14 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
     add_exchange(layout, problem, 1, 1, 0, exchange);
     layout.assemble(exchange);
   }
-  cooled = fixed(layout, problem.cooled, 1);
+  prescribed_temperature = fixed(layout, problem.prescribed_temperature, 1);
 }
 
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k) {
   MatHandle a =
       assemble(layout, problem, d, d, [k](const Simplex<d>& s, const Material<d>& m) { return momentum<d>(s, m, k); });
-  fix(a, operators.clamped);
+  fix(a, operators.prescribed_displacement);
   return a;
 }
 
@@ -167,7 +167,7 @@ MatHandle heat_matrix(const Operators<d>& operators, double k) {
   WARMSLIP_PETSC(MatScale(a, 1 / k));
   WARMSLIP_PETSC(MatAXPY(a, 1, operators.conductivity, SAME_NONZERO_PATTERN));
   if (operators.exchange) WARMSLIP_PETSC(MatAXPY(a, 1, operators.exchange, SUBSET_NONZERO_PATTERN));
-  fix(a, operators.cooled);
+  fix(a, operators.prescribed_temperature);
   return a;
 }
 
@@ -193,8 +193,8 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
   add_exchange(layout, problem, scale, b, d, a);
   layout.assemble(a);
   std::vector<PetscInt> indices;
-  for (const PetscInt i : operators.clamped) indices.push_back(i / d * b + i % d);
-  for (const PetscInt i : operators.cooled) indices.push_back(i * b + d);
+  for (const PetscInt i : operators.prescribed_displacement) indices.push_back(i / d * b + i % d);
+  for (const PetscInt i : operators.prescribed_temperature) indices.push_back(i * b + d);
   fix(a, indices);
   return a;
 }

@@ -16,24 +16,24 @@ template <int d>
 struct Operators {
   Operators(const Layout<d>& layout, const Problem<d>& problem);
 
-  MatHandle inertia;              ///< rho (w, v), one scalar matrix for all components
-  MatHandle elasticity;           ///< a(u, v)
-  MatHandle viscosity;            ///< b(w, v)
-  MatHandle mass;                 ///< (theta, eta) times the capacity, lumped where the problem says so
-  MatHandle conductivity;         ///< d(theta, eta)
-  MatHandle expansion;            ///< m(theta, v): rows v, columns theta
-  MatHandle heating;              ///< e(w, eta): rows eta, columns w
-  MatHandle exchange;             ///< int k_c theta eta over Gamma_C, as the mass
-  VecHandle reference;            ///< m(reference temperature, v); null where that is 0
-  std::vector<PetscInt> clamped;  ///< global scalar indices with given displacement, owned by this rank
-  std::vector<PetscInt> cooled;   ///< global nodes with given temperature, owned by this rank
+  MatHandle inertia;                              ///< rho (w, v), one scalar matrix for all components
+  MatHandle elasticity;                           ///< a(u, v)
+  MatHandle viscosity;                            ///< b(w, v)
+  MatHandle mass;                                 ///< (theta, eta) times the capacity, lumped where the problem says so
+  MatHandle conductivity;                         ///< d(theta, eta)
+  MatHandle expansion;                            ///< m(theta, v): rows v, columns theta
+  MatHandle heating;                              ///< e(w, eta): rows eta, columns w
+  MatHandle exchange;                             ///< int k_c theta eta over Gamma_C, as the mass
+  VecHandle reference;                            ///< m(reference temperature, v); null where that is 0
+  std::vector<PetscInt> prescribed_displacement;  ///< global scalar indices with given displacement, owned by this rank
+  std::vector<PetscInt> prescribed_temperature;   ///< global nodes with given temperature, owned by this rank
 };
 
-/// rho M / k + B + k A with the clamped rows and columns replaced by the identity.
+/// rho M / k + B + k A with the rows and columns of prescribed displacements replaced by the identity.
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k);
 
-/// M / k + D + J with the cooled rows and columns replaced by the identity.
+/// M / k + D + J with the rows and columns of prescribed temperatures replaced by the identity.
 template <int d>
 MatHandle heat_matrix(const Operators<d>& operators, double k);
 

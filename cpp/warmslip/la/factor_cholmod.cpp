@@ -137,7 +137,7 @@ class CholmodFactor final : public Factor {
   }
 
  private:
-  // Isolated (clamped) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing
+  // Isolated (prescribed) unknowns, then the interior nodes by nested dissection of the node graph, then the trailing
   // ones.
   std::vector<int> ordering(const Triangle& a, const std::vector<PetscInt>& trailing, int n, int block) {
     std::vector<bool> last(static_cast<std::size_t>(n), false);

@@ -78,11 +78,11 @@ WARMSLIP_WIDE void Panels::forward(double* x) const {
   double* t = work_.data();
   for (const Panel& p : panels_) {
     const double* a = values_.data() + p.value;
-    double* own = x + p.first;
+    double* x_panel = x + p.first;
     for (int j = 0; j < p.width; ++j)
-      for (int i = j + 1; i < p.width; ++i) own[i] -= *a++ * own[j];
+      for (int i = j + 1; i < p.width; ++i) x_panel[i] -= *a++ * x_panel[j];
     std::fill(t, t + p.rows, 0.0);
-    multiply(a, p.rows, p.width, own, t);
+    multiply(a, p.rows, p.width, x_panel, t);
     const int* rows = rows_.data() + p.row;
     for (int i = 0; i < p.rows; ++i) x[rows[i]] -= t[i];
   }
@@ -96,16 +96,16 @@ WARMSLIP_WIDE void Panels::backward(double* x) const {
     const double* inverse_pivots = inverse_pivots_.data() + p.first;
     const double* a = values_.data() + p.value + triangle;
     const int* rows = rows_.data() + p.row;
-    double* own = x + p.first;
+    double* x_panel = x + p.first;
     for (int i = 0; i < p.rows; ++i) t[i] = x[rows[i]];
     for (int j = 0; j < p.width; ++j) {
-      own[j] = own[j] * inverse_pivots[j] - dot(a, t, p.rows);
+      x_panel[j] = x_panel[j] * inverse_pivots[j] - dot(a, t, p.rows);
       a += p.rows;
     }
     a = values_.data() + p.value + triangle;
     for (int j = p.width - 2; j >= 0; --j) {
       a -= p.width - 1 - j;
-      own[j] -= dot(a, own + j + 1, p.width - 1 - j);
+      x_panel[j] -= dot(a, x_panel + j + 1, p.width - 1 - j);
     }
   }
 }

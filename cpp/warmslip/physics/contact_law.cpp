@@ -5,15 +5,15 @@ namespace warmslip {
 double NormalCompliance::pressure(double r) const {
   if (r <= 0) return 0;
   if (custom) return custom(r)[0];
-  return std::min(exponent == 1 ? stiffness * r : stiffness * std::pow(r, exponent), most);
+  return std::min(exponent == 1 ? stiffness * r : stiffness * std::pow(r, exponent), pressure_limit);
 }
 
 double NormalCompliance::tangent(double r) const {
   if (r <= 0) return 0;
   if (custom) return custom(r)[1];
-  if (exponent == 1) return rigid() || stiffness * r < most ? stiffness : 0;
+  if (exponent == 1) return rigid() || stiffness * r < pressure_limit ? stiffness : 0;
   const double slope = stiffness * exponent * std::pow(r, exponent - 1);
-  return slope * r / exponent < most ? slope : 0;
+  return slope * r / exponent < pressure_limit ? slope : 0;
 }
 
 double NormalCompliance::energy(double r) const {
@@ -22,9 +22,9 @@ double NormalCompliance::energy(double r) const {
   if (rigid()) return 0;  // it stores nothing
   if (linear()) return 0.5 * stiffness * r * r;
   const double full =
-      stiffness > 0 ? std::pow(most / stiffness, 1 / exponent) : r;  // penetration of the largest pressure
+      stiffness > 0 ? std::pow(pressure_limit / stiffness, 1 / exponent) : r;  // penetration of the largest pressure
   const double bent = std::min(r, full);
-  return stiffness * std::pow(bent, exponent + 1) / (exponent + 1) + (r > full ? most * (r - full) : 0);
+  return stiffness * std::pow(bent, exponent + 1) / (exponent + 1) + (r > full ? pressure_limit * (r - full) : 0);
 }
 
 FrictionBound Friction::bound(double pressure, double slip_speed) const {
@@ -46,7 +46,7 @@ double NormalCompliance::penetration(double pressure, double r) const {
 
 double NormalCompliance::remaining(double y, double give) const {
   if (linear()) return y / (1 + give * stiffness);
-  if (most < unlimited && y - give * most >= deepest_rise()) return y - give * most;
+  if (pressure_limit < unlimited && y - give * pressure_limit >= deepest_rise()) return y - give * pressure_limit;
   // convex and rising: from the right, Newton's method falls to the root
   double s = stiffness > 0 && give > 0 ? std::min(y, std::pow(y / (give * stiffness), 1 / exponent)) : y;
   for (int i = 0; i < 60; ++i) {
@@ -84,8 +84,8 @@ namespace {
 FrictionBound traction(const Friction& law, double pressure, double weight, double speed) {
   const FrictionBound bound = law.bound(pressure, speed);
   if (law.regularisation == 0) return {weight * bound.value, weight * bound.by_pressure, weight * bound.by_speed};
-  const double blunt = std::hypot(speed, law.regularisation), part = speed / blunt,
-               rise = law.regularisation / blunt / blunt * law.regularisation / blunt;
+  const double smoothed_speed = std::hypot(speed, law.regularisation), part = speed / smoothed_speed,
+               rise = law.regularisation / smoothed_speed / smoothed_speed * law.regularisation / smoothed_speed;
   return {weight * bound.value * part, weight * bound.by_pressure * part,
           weight * (bound.by_speed * part + bound.value * rise)};
 }
@@ -112,13 +112,13 @@ FrictionBound slipping(const Friction& law, double pressure, double weight, doub
 }  // namespace
 
 template <int d>
-PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
-                          const Point<d>& force, const Point<d>& velocity) {
+PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k,
+                          const PointCompliance& compliance, const Point<d>& force, const Point<d>& velocity) {
   const Point<d>& nu = point.normal;
   const Tensor2<d> normal = nu * nu.transpose();
   const Tensor2<d> tangential = Tensor2<d>::Identity() - normal;
-  const double r = point.penetration + k * velocity.dot(nu), lambda = force.dot(nu), beta = 1 / own.tangential;
-  const NormalResidual across = normal_residual(law.compliance, point.weight, own.normal, lambda, r);
+  const double r = point.penetration + k * velocity.dot(nu), lambda = force.dot(nu), beta = 1 / compliance.tangential;
+  const NormalResidual across = normal_residual(law.compliance, point.weight, compliance.normal, lambda, r);
   const Point<d> slip = tangential * velocity;
   const double speed = slip.norm(), pressure = std::max(lambda, 0.0) / point.weight;
   const bool smooth = law.friction.regularisation > 0;
@@ -216,11 +216,11 @@ double friction_power(const Friction& friction, double bound, double slip_speed)
   return bound * slip_speed;
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                                                  \
-  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, const OwnCompliance&, \
-                                        const Point<d>&, const Point<d>&);                                       \
-  template Point<d> settled<d>(const ContactLaw&, const ContactPoint<d>&, double, Status, const Point<d>&,       \
-                               const Point<d>&, const Point<d>&);                                                \
+#define WARMSLIP_INSTANTIATE(d)                                                                                    \
+  template PointResidual<d> residual<d>(const ContactLaw&, const ContactPoint<d>&, double, const PointCompliance&, \
+                                        const Point<d>&, const Point<d>&);                                         \
+  template Point<d> settled<d>(const ContactLaw&, const ContactPoint<d>&, double, Status, const Point<d>&,         \
+                               const Point<d>&, const Point<d>&);                                                  \
   template double friction_defect<d>(const Friction&, double, const Point<d>&, const Point<d>&, double, double);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

@@ -15,12 +15,12 @@ namespace warmslip {
 
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-/// p_nu(r) = min(stiffness max(r, 0)^exponent, most), the pressure on a penetration r = u_nu - g. An unlimited
-/// stiffness is a rigid foundation: r <= 0, and any pressure at r = 0 (Signorini).
+/// p_nu(r) = min(stiffness max(r, 0)^exponent, pressure_limit), the pressure on a penetration r = u_nu - g. An
+/// unlimited stiffness is a rigid foundation: r <= 0, and any pressure at r = 0 (Signorini).
 struct NormalCompliance {
-  double stiffness = 0;     ///< c_nu, stress per length^exponent
-  double exponent = 1;      ///< >= 1, dimensionless
-  double most = unlimited;  ///< stress
+  double stiffness = 0;               ///< c_nu, stress per length^exponent
+  double exponent = 1;                ///< >= 1, dimensionless
+  double pressure_limit = unlimited;  ///< stress
   /// A law of the user's in its place: pressure, derivative and energy (P' = p_nu, P(0) = 0) of r; p_nu(r) = 0 for r <=
   /// 0.
   std::function<std::array<double, 3>(double)> custom{};
@@ -29,14 +29,16 @@ struct NormalCompliance {
   double tangent(double r) const;
   /// P with P' = p_nu and P(0) = 0, energy per area.
   double energy(double r) const;
-  bool linear() const { return !custom && exponent == 1 && most == unlimited; }
+  bool linear() const { return !custom && exponent == 1 && pressure_limit == unlimited; }
   bool rigid() const { return !custom && stiffness == unlimited; }
   /// The penetration under `pressure` > 0; `r` where the law does not tell (no pressure, the largest, a custom law).
   double penetration(double pressure, double r) const;
   /// Whether a pressure is the largest one, but for rounding.
-  bool at_limit(double pressure) const { return pressure >= (1 - 1e-10) * most; }
+  bool at_limit(double pressure) const { return pressure >= (1 - 1e-10) * pressure_limit; }
   /// The penetration from which on the pressure is the largest one; unlimited where there is none.
-  double deepest_rise() const { return most < unlimited ? std::pow(most / stiffness, 1 / exponent) : unlimited; }
+  double deepest_rise() const {
+    return pressure_limit < unlimited ? std::pow(pressure_limit / stiffness, 1 / exponent) : unlimited;
+  }
   /// s with s + give p_nu(s) = y: what is left of the penetration y > 0 at a point that recedes by `give` (length per
   /// stress) under pressure. Not for custom laws.
   double remaining(double y, double give) const;
@@ -85,12 +87,12 @@ struct ContactLaw {
 };
 
 /// Heat that the contact itself conducts and makes, beside a constant k_c: q . nu = per_pressure p_nu (theta - theta_F)
-/// - friction_share |sigma_tau . w_tau|.
+/// - share |sigma_tau . w_tau|.
 struct ContactHeat {
-  double per_pressure = 0;    ///< conductance per stress
-  double friction_share = 0;  ///< of the frictional heat, into the body; in [0, 1]
+  double per_pressure = 0;  ///< conductance per stress
+  double share = 0;         ///< of the frictional heat, into the body; in [0, 1]
 
-  bool present() const { return per_pressure > 0 || friction_share > 0; }
+  bool present() const { return per_pressure > 0 || share > 0; }
 };
 
 enum class Status : std::int8_t { open, stick, slip };
@@ -108,7 +110,7 @@ struct ContactPoint {
 };
 
 /// A point's own compliance, which scales the rows of its residual and does not move their zeros.
-struct OwnCompliance {
+struct PointCompliance {
   double normal;      ///< penetration per normal force, length per force
   double tangential;  ///< velocity per tangential force
 };
@@ -116,10 +118,10 @@ struct OwnCompliance {
 /// Residual and generalised derivative of the law at one point, written so that zero is the law itself (Alart &
 /// Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991): with force lambda and velocity w,
 ///   normal      see NormalResidual
-///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + w_tau / own),   T = weight times the friction bound
+///   tangential  lambda_tau - proj_{|.| <= T}(lambda_tau + w_tau / c),   T = weight times the friction bound
 /// The bound reads the pressure from the unknown force, max(lambda_nu, 0) / weight, and not from the penetration: an
 /// iterate whose penetration no force has stopped yet would have far too large a bound. A bound that depends on the
-/// speed is taken at the speed s with T(s) + s / own = |lambda_tau + w_tau / own|, its resolvent. Regularised friction
+/// speed is taken at the speed s with T(s) + s / c = |lambda_tau + w_tau / own|, its resolvent. Regularised friction
 /// has lambda_tau - T w_tau / (|w_tau|^2 + eps^2)^(1/2) for its second row.
 template <int d>
 struct PointResidual {
@@ -140,8 +142,8 @@ struct PointResidual {
 };
 
 template <int d>
-PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k, const OwnCompliance& own,
-                          const Point<d>& force, const Point<d>& velocity);
+PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, double k,
+                          const PointCompliance& compliance, const Point<d>& force, const Point<d>& velocity);
 
 /// The velocity of a closed point as the law has it: at rest where it sticks, and as deep as its force says. What
 /// momentum leaves of the velocity `free` without contact force is `velocity`, known but for rounding of `free`: far

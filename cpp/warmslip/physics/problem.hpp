@@ -49,9 +49,9 @@ template <int d>
 struct Problem {
   std::shared_ptr<const Mesh<d>> mesh;
   std::vector<Material<d>> materials;
-  std::vector<int> regions;          ///< material of every cell; empty: the first one everywhere
-  std::vector<std::string> clamped;  ///< parts with given displacement (2.5)
-  std::vector<std::string> cooled;   ///< parts with given temperature (2.7)
+  std::vector<int> regions;                          ///< material of every cell; empty: the first one everywhere
+  std::vector<std::string> prescribed_displacement;  ///< parts with given displacement (2.5)
+  std::vector<std::string> prescribed_temperature;   ///< parts with given temperature (2.7)
   std::vector<ContactPart> contacts;
   bool lumped = false;  ///< capacity and exchange by the vertex rule, diagonal: no new extremes on non-obtuse meshes
 

@@ -7,8 +7,8 @@
 namespace warmslip {
 
 template <int d>
-Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-                          const ContactSurface<d>& surface)
+BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                                      const ContactSurface<d>& surface)
     : layout_(layout),
       problem_(problem),
       operators_(operators),
@@ -40,17 +40,19 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   for (PetscInt& i : unknowns_) i -= first * d;
   for (PetscInt& i : nodes_) i -= first;
-  clamped_.resize(static_cast<std::size_t>(layout.owned()));
-  cooled_.resize(clamped_.size());
-  for (const PetscInt i : operators.clamped) clamped_[static_cast<std::size_t>(i / d - first)] = true;
-  for (const PetscInt i : operators.cooled) cooled_[static_cast<std::size_t>(i - first)] = true;
+  displacement_prescribed_.resize(static_cast<std::size_t>(layout.owned()));
+  temperature_prescribed_.resize(displacement_prescribed_.size());
+  for (const PetscInt i : operators.prescribed_displacement)
+    displacement_prescribed_[static_cast<std::size_t>(i / d - first)] = true;
+  for (const PetscInt i : operators.prescribed_temperature)
+    temperature_prescribed_[static_cast<std::size_t>(i - first)] = true;
   for (const auto& [rows, size] :
        {std::pair{&heating_rows_, &heating_}, std::pair{&mass_rows_, &mass_},
         std::pair{&conduction_rows_, &conduction_}, std::pair{&exchange_rows_, &exchange_}}) {
     size->sum = layout.sum(rows->size() ? rows->sum() : 0.0);
-    size->most = over_ranks(layout.comm(), std::array{rows->size() ? rows->maxCoeff() : 0.0})[0];
+    size->largest = over_ranks(layout.comm(), std::array{rows->size() ? rows->maxCoeff() : 0.0})[0];
   }
-  any_cooled_ = layout.sum(static_cast<double>(operators.cooled.size())) > 0;
+  any_temperature_prescribed_ = layout.sum(static_cast<double>(operators.prescribed_temperature.size())) > 0;
   double stiffest = elastic_rows_.size() ? elastic_rows_.maxCoeff() : 0;
   MPI_Allreduce(&stiffest, &stiffest_, 1, MPI_DOUBLE, MPI_MAX, layout.comm());
   const double length = (layout.mesh().nodes.colwise().maxCoeff() - layout.mesh().nodes.colwise().minCoeff()).norm();
@@ -62,11 +64,11 @@ Bookkeeper<d>::Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, co
   }
   heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
   force_magnitudes_ = force_external_ = Eigen::VectorXd::Zero(layout.owned() * d);
-  interpolate_anew();
+  find_shape_functions();
 }
 
 template <int d>
-Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepInputs& in) {
+Balances BalanceEvaluator<d>::evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& in) {
   if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
@@ -74,26 +76,26 @@ Ledger Bookkeeper<d>::close(const Level& before, const Level& after, const StepI
 }
 
 template <int d>
-void Bookkeeper<d>::weigh(const Level& before, const Level& after, const StepInputs& in) {
-  keeps_ = true;
+void BalanceEvaluator<d>::store_magnitudes(const TimeLevel& before, const TimeLevel& after, const StepInputs& in) {
+  stores_magnitudes_ = true;
   terms(before, after, in);
-  keeps_ = false;
+  stores_magnitudes_ = false;
 }
 
 template <int d>
-Ledger Bookkeeper<d>::terms(const Level& before, const Level& after, const StepInputs& in) {
-  Ledger ledger{};
+Balances BalanceEvaluator<d>::terms(const TimeLevel& before, const TimeLevel& after, const StepInputs& in) {
+  Balances balances{};
   work_magnitude_ = 0;
-  if (surface_.points() > 0) contact(before, after, in, ledger);
+  if (surface_.points() > 0) contact(before, after, in, balances);
   if (after.w) {
-    forces(before, after, in, ledger);
-    energy(before, after, in, ledger);
+    forces(before, after, in, balances);
+    energy(before, after, in, balances);
   }
-  if (after.theta) heat(before, after, in, ledger);
-  return ledger;
+  if (after.theta) heat(before, after, in, balances);
+  return balances;
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

@@ -7,24 +7,24 @@
 namespace warmslip {
 
 template <int d>
-class Bookkeeper {
+class BalanceEvaluator {
  public:
-  Bookkeeper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-             const ContactSurface<d>& surface);
+  BalanceEvaluator(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                   const ContactSurface<d>& surface);
 
   /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
   void rigid_share(double share) { rigid_share_ = share; }
 
-  /// Closes the books of the step from `before` to `after` (collective).
-  Ledger close(const Level& before, const Level& after, const StepInputs& inputs);
+  /// The balances of the step from `before` to `after` (collective).
+  Balances evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);
   /// Keeps the magnitudes of the equations of the step that was closed last, for `add_rounding` (collective).
-  void weigh(const Level& before, const Level& after, const StepInputs& inputs);
+  void store_magnitudes(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);
 
   /// What the equations of the last closed step leave over, zero in the fixed rows: load minus response. `external`,
   /// where given, receives the part without inner forces (elastic, viscous, of expansion; conducted heat).
-  void momentum_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+  void momentum_defect(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Vec out,
                        Vec external = nullptr) const;
-  void heat_defect(const Level& before, const Level& after, const StepInputs& inputs, Vec out,
+  void heat_defect(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Vec out,
                    Vec external = nullptr) const;
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
   /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
@@ -32,14 +32,14 @@ class Bookkeeper {
   void add_rounding(Vec defect, Vec external) const;
 
  private:
-  Ledger terms(const Level& before, const Level& after, const StepInputs& inputs);
-  void contact(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  void contact_heat(const Level& after, const StepInputs& inputs, const Eigen::VectorXd& w, Ledger& ledger);
-  void forces(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  void energy(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  void heat(const Level& before, const Level& after, const StepInputs& inputs, Ledger& ledger);
-  double temperature_of_rounding(const Level& before, const Level& after, double k) const;
-  void interpolate_anew();
+  Balances terms(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);
+  void contact(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Balances& balances);
+  void contact_heat(const TimeLevel& after, const StepInputs& inputs, const Eigen::VectorXd& w, Balances& balances);
+  void forces(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Balances& balances);
+  void energy(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Balances& balances);
+  void heat(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Balances& balances);
+  double temperature_of_rounding(const TimeLevel& before, const TimeLevel& after, double k) const;
+  void find_shape_functions();
   Eigen::VectorXd at_points(Vec v) const;
   void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
 
@@ -53,19 +53,19 @@ class Bookkeeper {
   Eigen::SparseMatrix<double, Eigen::RowMajor>
       shape_;  // hat functions at the contact points, found anew from positions
   struct RowSizes {
-    double sum = 0, most = 0;
+    double sum = 0, largest = 0;
   };
   RowSizes heating_, mass_, conduction_, exchange_;     // of the rows of the heat equation
-  bool any_cooled_ = false;                             // whether a temperature is given
+  bool any_temperature_prescribed_ = false;             // whether a temperature is given
   Eigen::VectorXd force_magnitudes_, heat_magnitudes_;  // of the rows, zero where they are fixed
   Eigen::VectorXd force_external_, heat_external_;      // but for the inner forces and the conduction
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
-  std::vector<PetscInt> unknowns_, nodes_;  // of contact, relative to the owned range
-  std::vector<bool> clamped_, cooled_;      // a node
+  std::vector<PetscInt> unknowns_, nodes_;                              // of contact, relative to the owned range
+  std::vector<bool> displacement_prescribed_, temperature_prescribed_;  // a node
   double rigid_share_ = 1;
-  bool keeps_ = false;                         // whether the step that is being closed notes its magnitudes
+  bool stores_magnitudes_ = false;             // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity
   double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature
   Point<d> centroid_;                          // moments are taken about it

@@ -1,4 +1,4 @@
-// The ledger's terms of the contact, with its own interpolation to the contact points.
+// The terms of the contact in the balances, with their own interpolation to the contact points.
 #include <map>
 #include <stdexcept>
 
@@ -12,7 +12,7 @@ namespace warmslip {
 // used, so that a fault in it shows. Points come in the order of the facets, hence the search goes on from the last
 // one.
 template <int d>
-void Bookkeeper<d>::interpolate_anew() {
+void BalanceEvaluator<d>::find_shape_functions() {
   const Mesh<d>& mesh = layout_.mesh();
   std::map<Index, int> column;
   for (const Index node : surface_.mesh_nodes()) column.emplace(node, static_cast<int>(column.size()));
@@ -46,9 +46,9 @@ void Bookkeeper<d>::interpolate_anew() {
   shape_.setFromTriplets(entries.begin(), entries.end());
 }
 
-// Values at the contact points, (block points), with the ledger's own interpolation.
+// Values at the contact points, (block points), with the interpolation of the balances.
 template <int d>
-Eigen::VectorXd Bookkeeper<d>::at_points(Vec v) const {
+Eigen::VectorXd BalanceEvaluator<d>::at_points(Vec v) const {
   const Eigen::Index block = block_size(v);
   const Eigen::VectorXd nodal = surface_.nodal_values(v);
   const RealTable<Eigen::Dynamic> table =
@@ -58,16 +58,16 @@ Eigen::VectorXd Bookkeeper<d>::at_points(Vec v) const {
 
 // Replicated nodal values into the entries `at`, relative to this rank's range, of a distributed vector.
 template <int d>
-void Bookkeeper<d>::place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const {
+void BalanceEvaluator<d>::place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const {
   Values values(out);
   for (std::size_t i = 0; i < at.size(); ++i)
     if (at[i] >= 0 && at[i] < (*values).size()) (*values)[at[i]] = nodal[static_cast<Eigen::Index>(i)];
 }
 
 // The contact terms: stored energy and friction from the forces, as a stiff law leaves no digits to its penetrations;
-// that forces and penetrations obey the law is a balance of its own.
+// that forces and penetrations apply_regularised_law the law is a balance of its own.
 template <int d>
-void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
   const ContactProblem<d> problem = contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
   double stored_before = 0;
@@ -111,7 +111,8 @@ void Bookkeeper<d>::contact(const Level& before, const Level& after, const StepI
 
 // Heat that the contact conducts by its pressure and makes by friction.
 template <int d>
-void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const Eigen::VectorXd& w, Ledger& l) {
+void BalanceEvaluator<d>::contact_heat(const TimeLevel& after, const StepInputs& in, const Eigen::VectorXd& w,
+                                       Balances& l) {
   const Eigen::VectorXd theta = at_points(after.theta);
   Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points()), sizes = leaving;
   const double rest = 1e-12 * in.contact_free.cwiseAbs().maxCoeff();  // a slip below is rounding
@@ -120,7 +121,7 @@ void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const
     const Point<d> nu = surface_.normals().row(i).transpose(), velocity = w.template segment<d>(i * d),
                    slip = velocity - velocity.dot(nu) * nu, force = in.contact_force.template segment<d>(i * d);
     const double conducted = part.heat.per_pressure * std::max(force.dot(nu), 0.0) * (theta[i] - in.foundation[i]),
-                 made = slip.norm() > rest ? part.heat.friction_share * force.dot(slip) : 0;
+                 made = slip.norm() > rest ? part.heat.share * force.dot(slip) : 0;
     l.exchanged += in.k * conducted * theta[i];
     l.friction_heating += in.k * made * theta[i];
     leaving[i] = conducted - made;
@@ -132,7 +133,7 @@ void Bookkeeper<d>::contact_heat(const Level& after, const StepInputs& in, const
   place(nodes_, shape_.transpose() * sizes, contact_heat_size_);
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

@@ -15,8 +15,8 @@ void add(Vec out, double factor, Vec v) {
 }  // namespace
 
 template <int d>
-void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
-                                    Vec external) const {
+void BalanceEvaluator<d>::momentum_defect(const TimeLevel& before, const TimeLevel& after, const StepInputs& in,
+                                          Vec out, Vec external) const {
   WARMSLIP_PETSC(VecCopy(in.force, out));
   add(out, -1, contact_force_);
   if (after.momentum) {
@@ -29,12 +29,12 @@ void Bookkeeper<d>::momentum_defect(const Level& before, const Level& after, con
   add(out, -1, after.elastic_u);
   Values values(out);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
-    if (clamped_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
+    if (displacement_prescribed_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
 }
 
 template <int d>
-void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const StepInputs& in, Vec out,
-                                Vec external) const {
+void BalanceEvaluator<d>::heat_defect(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Vec out,
+                                      Vec external) const {
   WARMSLIP_PETSC(VecCopy(in.heat, out));
   add(out, 1, in.heating_w);
   add(out, -1, exchanged_);
@@ -47,11 +47,11 @@ void Bookkeeper<d>::heat_defect(const Level& before, const Level& after, const S
   add(out, -1, conducted_);
   Values values(out);
   for (PetscInt i = 0; i < layout_.owned(); ++i)
-    if (cooled_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
+    if (temperature_prescribed_[static_cast<std::size_t>(i)]) (*values)[i] = 0;
 }
 
 template <int d>
-void Bookkeeper<d>::add_rounding(Vec defect, Vec external) const {
+void BalanceEvaluator<d>::add_rounding(Vec defect, Vec external) const {
   const Eigen::Index block = block_size(defect);
   const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
                         &outer = block == 1 ? heat_external_ : force_external_;
@@ -66,7 +66,7 @@ void Bookkeeper<d>::add_rounding(Vec defect, Vec external) const {
     }
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

@@ -5,7 +5,7 @@ namespace warmslip {
 
 // Momentum tested with k w_n.
 template <int d>
-void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+void BalanceEvaluator<d>::energy(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   const double kinetic_before = 0.5 * dot(before.w, before.momentum),
                elastic_before = 0.5 * dot(before.shape(), before.elastic_u);
   l.kinetic = 0.5 * dot(after.w, after.momentum);
@@ -27,7 +27,7 @@ void Bookkeeper<d>::energy(const Level& before, const Level& after, const StepIn
                         work_magnitude_);
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

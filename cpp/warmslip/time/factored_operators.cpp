@@ -37,7 +37,7 @@ Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Op
       operators_(operators),
       surface_(surface),
       options_(options),
-      books_(layout, problem, operators, surface) {
+      evaluator_(layout, problem, operators, surface) {
   if (!(options.k > 0) || !std::isfinite(options.k))
     throw std::invalid_argument("the time step must be positive and finite");
   const Timed timed(cost_.setup_seconds);
@@ -64,10 +64,11 @@ std::vector<std::string> Stepper<d>::parts_in_contact(bool mechanical) const {
 template <int d>
 void Stepper<d>::take_motion(Mat a, int width, Symmetry symmetry, const std::string& name) {
   if (operators_.elasticity || operators_.viscosity)
-    rigid_ = RigidMotions(
-        layout_, d, width, problem_.clamped, parts_in_contact(true), at_nodes(problem_, [&](const Material<d>& m) {
-          return (m.elasticity ? options_.k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
-        }));
+    rigid_ = RigidMotions(layout_, d, width, problem_.prescribed_displacement, parts_in_contact(true),
+                          at_nodes(problem_, [&](const Material<d>& m) {
+                            return (m.elasticity ? options_.k * m.elasticity->norm() : 0) +
+                                   (m.viscosity ? m.viscosity->norm() : 0);
+                          }));
   if (!rigid_.empty()) rigid_.add_springs(a);
   momentum_ = factor(a, surface_.unknowns(width), symmetry, width, name, options_.backend);
   if (rigid_.empty()) return;
@@ -76,7 +77,7 @@ void Stepper<d>::take_motion(Mat a, int width, Symmetry symmetry, const std::str
     WARMSLIP_PETSC(VecScale(y, 1 / options_.k));
   });
   if (symmetry == Symmetry::definite_or_refused && !rigid_.holds()) throw std::invalid_argument(indefinite_coupling);
-  books_.rigid_share(rigid_.share());
+  evaluator_.rigid_share(rigid_.share());
 }
 
 template <int d>
@@ -101,7 +102,7 @@ void Stepper<d>::take_factors() {
       const double storing = largest_diagonal(operators_.mass) / k + largest_diagonal(operators_.exchange);
       if (storing < 0.1 * largest_diagonal(operators_.conductivity))
         constants_ = RigidMotions(
-            layout_, 1, 1, problem_.cooled, parts_in_contact(false),
+            layout_, 1, 1, problem_.prescribed_temperature, parts_in_contact(false),
             at_nodes(problem_, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
       if (!constants_.empty()) constants_.add_springs(h);
       const auto apart = problem_.contact_heats() ? surface_.global_nodes() : std::vector<PetscInt>{};
@@ -118,7 +119,7 @@ void Stepper<d>::take_factors() {
   }
   if (surface_.points() == 0) return;
   ContactOptions contact = options_.contact;
-  // forces are shared in many ways, see ContactSolver::shared and share_least
+  // forces are shared in many ways, see ContactSolver::shared and minimal_forces
   if (surface_.shares()) contact.proximal = 1e-6;
   RigidCoupling apart{Eigen::MatrixXd(surface_.points() * d, rigid_.count()), {}, rigid_.inertia()};
   apart.loads = carried_ = apart.motions;
@@ -133,7 +134,7 @@ void Stepper<d>::take_factors() {
 template <int d>
 void Stepper<d>::take_vectors() {
   const bool moves = problem_.moves(), conducts = problem_.conducts();
-  for (Level* level : {&now_, &next_}) {
+  for (TimeLevel* level : {&now_, &next_}) {
     if (moves) {
       level->u = layout_.vector(d);
       level->w = layout_.vector(d);
@@ -162,7 +163,7 @@ void Stepper<d>::take_vectors() {
     for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);
   if (reactive()) {
     Eigen::VectorXd held = Eigen::VectorXd::Zero(layout_.mesh().nodes.rows());
-    for (const PetscInt i : operators_.cooled) held[i] = 1;
+    for (const PetscInt i : operators_.prescribed_temperature) held[i] = 1;
     held = layout_.sum(std::move(held));
     for (const PetscInt i : surface_.global_nodes()) fixed_contact_.push_back(held[i] > 0);
   }

@@ -24,15 +24,15 @@ double largest_here(Vec v) {
 }  // namespace
 
 template <int d>
-void Stepper<d>::products(Level& level) const {
+void Stepper<d>::products(TimeLevel& level) const {
   multiply(operators_.inertia, level.w, level.momentum);
   if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
   multiply(operators_.mass, level.theta, level.mass_theta);
   if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
-  std::array<double, 4> most{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
-                             largest_here(level.theta)};
-  MPI_Allreduce(MPI_IN_PLACE, most.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
-  level.sizes = {most[0], most[1], level.strained_w ? most[2] : most[1], most[3]};
+  std::array<double, 4> largest{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
+                                largest_here(level.theta)};
+  MPI_Allreduce(MPI_IN_PLACE, largest.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
+  level.sizes = {largest[0], largest[1], level.strained_w ? largest[2] : largest[1], largest[3]};
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
 }
 
@@ -69,7 +69,7 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
     less(operators_.elasticity, k, loads.support_velocity);
   }
   if (monolithic() && loads.support_temperature) less(operators_.expansion, -1, loads.support_temperature);
-  fix(out, operators_.clamped, loads.support_velocity);
+  fix(out, operators_.prescribed_displacement, loads.support_velocity);
 }
 
 // q + M theta_{n-1} / k + E w, less what warm supports conduct; `scale` is that of the heat rows
@@ -86,7 +86,7 @@ void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double s
     less(operators_.exchange, 1, loads.support_temperature);
   }
   if (monolithic() && loads.support_velocity) less(operators_.heating, -1, loads.support_velocity);
-  fix(out, operators_.cooled, loads.support_temperature, 1 / scale);
+  fix(out, operators_.prescribed_temperature, loads.support_temperature, 1 / scale);
 }
 
 // The free velocities of the contact points for a right-hand side, which is remembered with the load on the motions
@@ -101,7 +101,7 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
 // Gives the contact nodes that are also points the velocity of their law, in w; `moved` has the same change. Rounding
 // of the free velocity would else be that of a penetration far smaller.
 template <int d>
-void Stepper<d>::settle(const ContactSolution<d>& contact, Vec w, Vec moved) const {
+void Stepper<d>::apply_contact_velocity(const ContactSolution<d>& contact, Vec w, Vec moved) const {
   std::vector<Eigen::Index> closed;
   for (Eigen::Index i = 0; i < surface_.points(); ++i)
     if (surface_.own_node(i) >= 0 && contact.status[static_cast<std::size_t>(i)] != Status::open) closed.push_back(i);
@@ -142,7 +142,7 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
   const Timed timed(cost_.contact_seconds);
   solution = contact_->solve(posed_, guess);
   if (solution.converged && surface_.shares())
-    share_least(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
+    minimal_forces(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
@@ -178,7 +178,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
     rigid_.carry(next_.rigid, next_.w);
   }
-  if (contact_) settle(contact, next_.w, next_.strained_w);
+  if (contact_) apply_contact_velocity(contact, next_.w, next_.strained_w);
   return true;
 }
 

@@ -31,12 +31,12 @@ struct Resultant {
 // The equation of motion at every free node, force and moment: the supports' reactions are the residuals of the fixed
 // rows.
 template <int d>
-void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   Resultant<d> force;
   double work = 0;
   enum { defect, backward, acting, applied, strained, inner };
-  std::array<double, 6> most{};
-  const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
+  std::array<double, 6> largest{};
+  const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
                w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta;
   const bool warm = theta > temperature_of_rounding(before, after, in.k);
@@ -60,12 +60,12 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
                    moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
                    within = u * row(elastic_rows_) + w * row(viscous_rows_),
                    magnitude = moved + given + within + theta * row(expansion_rows_);
-      const bool fixed = clamped_[static_cast<std::size_t>(i)];
+      const bool fixed = displacement_prescribed_[static_cast<std::size_t>(i)];
       // a force in one direction has no rounding in another, in which the body may be free to move
       const Point<d> outer =
           fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
-      if (keeps_) force_external_.template segment<d>(i * d) = outer;
-      if (keeps_)
+      if (stores_magnitudes_) force_external_.template segment<d>(i * d) = outer;
+      if (stores_magnitudes_)
         force_magnitudes_.template segment<d>(i * d) =
             fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
       if (fixed) {
@@ -97,14 +97,15 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   const auto sums = all.template head<many>(), sizes = all.template segment<many>(many);
   work_magnitude_ += all[2 * many];
   l.support_work = all[2 * many + 1];
-  most = over_ranks(layout_.comm(), most);
-  l.force_residual = most[backward];
+  largest = over_ranks(layout_.comm(), largest);
+  l.force_residual = largest[backward];
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
-  l.force_defect = relative(most[defect], most[acting]);
+  l.force_defect = relative(largest[defect], largest[acting]);
   // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u makes are none
-  const bool loaded = most[applied] > 1e-14 * most[inner];
-  l.force_scale = loaded ? std::max(most[applied], most[strained]) : std::max(most[acting], 1e-11 * most[inner]);
+  const bool loaded = largest[applied] > 1e-14 * largest[inner];
+  l.force_scale =
+      loaded ? std::max(largest[applied], largest[strained]) : std::max(largest[acting], 1e-11 * largest[inner]);
   l.contact_scale = loaded ? 1e-9 * l.force_scale : l.force_scale;
   // and displacements whose forces could at most be so small are none
   if (stiffest_ > 0) l.displacement_scale = 1e-8 * l.force_scale / stiffest_;
@@ -112,7 +113,7 @@ void Bookkeeper<d>::forces(const Level& before, const Level& after, const StepIn
   l.displacement_scale = std::max(l.displacement_scale, 1e-8 * free_expansion_ * std::max(theta, reference_));
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

@@ -11,21 +11,21 @@ namespace warmslip {
 // A temperature that rounding of the velocity makes through the heating: at a node against all that holds its
 // temperature, and of the whole body, where none is given, against what holds the constant.
 template <int d>
-double Bookkeeper<d>::temperature_of_rounding(const Level& before, const Level& after, double k) const {
-  const double here = relative(heating_.most, mass_.most / k + conduction_.most + exchange_.most),
-               whole = any_cooled_ ? 0 : relative(heating_.sum, mass_.sum / k + exchange_.sum);
+double BalanceEvaluator<d>::temperature_of_rounding(const TimeLevel& before, const TimeLevel& after, double k) const {
+  const double here = relative(heating_.largest, mass_.largest / k + conduction_.largest + exchange_.largest),
+               whole = any_temperature_prescribed_ ? 0 : relative(heating_.sum, mass_.sum / k + exchange_.sum);
   return 1e-10 * std::max(after.sizes.w, before.sizes.w) * std::max(here, whole);
 }
 
 // The heat balance tested with k theta_n and with 1, and its equation at every free node.
 template <int d>
-void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInputs& in, Ledger& l) {
+void BalanceEvaluator<d>::heat(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   const double stored_before = 0.5 * dot(before.theta, before.mass_theta),
                stored = 0.5 * dot(after.theta, after.mass_theta);
   double content = 0, content_size = 0, work = 0;
   enum { defect, backward, acting };
-  std::array<double, 3> most{};
-  const auto raise = [&](std::size_t which, double value) { most[which] = std::max(most[which], value); };
+  std::array<double, 3> largest{};
+  const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double theta = after.sizes.theta, both = std::max(theta, before.sizes.theta), w = in.coupling_w;
   // a velocity that strains is known to the rounding of one that carries the body: a millionth is as far from it as
   // round-off is from the bound on a balance
@@ -42,12 +42,14 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
       const double terms = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
                            theta * at(exchange_rows_, i) + at(*sizes, i) + w * at(heating_rows_, i),
                    magnitude = terms + carried * at(heating_rows_, i);
-      content += cooled_[static_cast<std::size_t>(i)] ? external - wall : external;
+      content += temperature_prescribed_[static_cast<std::size_t>(i)] ? external - wall : external;
       content_size += magnitude;
-      if (keeps_) heat_magnitudes_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms;
-      if (keeps_) heat_external_[i] = cooled_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
-      if (cooled_[static_cast<std::size_t>(i)]) {
-        l.held += in.k * wall * (*values)[i];
+      if (stores_magnitudes_) heat_magnitudes_[i] = temperature_prescribed_[static_cast<std::size_t>(i)] ? 0 : terms;
+      if (stores_magnitudes_)
+        heat_external_[i] =
+            temperature_prescribed_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
+      if (temperature_prescribed_[static_cast<std::size_t>(i)]) {
+        l.support_heat += in.k * wall * (*values)[i];
       } else {
         raise(defect, std::abs(wall));
         if (magnitude > std::numeric_limits<double>::min()) raise(backward, std::abs(wall) / magnitude);
@@ -58,27 +60,27 @@ void Bookkeeper<d>::heat(const Level& before, const Level& after, const StepInpu
     }
   }
   Eigen::VectorXd all(4);
-  all << l.held, content, content_size, work;
+  all << l.support_heat, content, content_size, work;
   all = layout_.sum(std::move(all));
-  l.held = all[0];
+  l.support_heat = all[0];
   l.heat_change = stored - stored_before;
   l.heat_damping = 0.5 * dot_of_changes(layout_, after.theta, before.theta, after.mass_theta, before.mass_theta);
   l.conducted = in.k * dot(after.theta, conducted_);
   l.exchanged += in.k * dot(after.theta, exchanged_);
   l.supplied = in.k * dot(in.heat, after.theta);
   l.heating = in.k * dot(in.heating_w, after.theta);
-  const double sum =
-      l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating - l.friction_heating - l.held;
-  most = over_ranks(layout_.comm(), most);
-  l.heat_residual = std::max({most[backward], relative(all[1], all[2]),
+  const double sum = l.heat_change + l.heat_damping + l.conducted + l.exchanged - l.supplied - l.heating -
+                     l.friction_heating - l.support_heat;
+  largest = over_ranks(layout_.comm(), largest);
+  l.heat_residual = std::max({largest[backward], relative(all[1], all[2]),
                               relative(sum, largest_of({stored, stored_before, l.heat_damping, l.conducted, l.exchanged,
-                                                        l.supplied, l.heating, l.friction_heating, l.held}) +
+                                                        l.supplied, l.heating, l.friction_heating, l.support_heat}) +
                                                 all[3])});
-  l.heat_defect = relative(most[defect], most[acting]);
+  l.heat_defect = relative(largest[defect], largest[acting]);
   l.temperature_scale = temperature_of_rounding(before, after, in.k);
 }
 
-template class Bookkeeper<2>;
-template class Bookkeeper<3>;
+template class BalanceEvaluator<2>;
+template class BalanceEvaluator<3>;
 
 }  // namespace warmslip

@@ -36,14 +36,15 @@ void Stepper<d>::note(double& error, Extent& field, double change, double size, 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
 // solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
 template <int d>
-bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply) {
+bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact,
+                                bool apply) {
   const bool monolithic = this->monolithic();
   const StepInputs inputs = this->inputs(loads, contact);
-  books_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
-  if (!apply) books_.add_rounding(momentum_right_, momentum_external_);
+  evaluator_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
+  if (!apply) evaluator_.add_rounding(momentum_right_, momentum_external_);
   if (monolithic) {
-    books_.heat_defect(now_, next_, inputs, heat_right_);
-    if (!apply) books_.add_rounding(heat_right_, nullptr);
+    evaluator_.heat_defect(now_, next_, inputs, heat_right_);
+    if (!apply) evaluator_.add_rounding(heat_right_, nullptr);
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
@@ -70,17 +71,17 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     rigid_.carry(motions, correction_w_);
   }
   if (monolithic) {
-    note_temperature(ledger);
+    note_temperature(balances);
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
   }
   if (contact_) {
     const Vec moved = momentum_right_;
     WARMSLIP_PETSC(VecWAXPY(moved, 1, correction_w_, next_.w));
-    settle(again, moved, correction_strained_);
+    apply_contact_velocity(again, moved, correction_strained_);
     WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
   }
   note(errors_.u, extents_.u, options_.k * largest_entry(correction_w_),
-       std::max(largest_entry(next_.u), largest_entry(now_.u)), ledger.displacement_scale);
+       std::max(largest_entry(next_.u), largest_entry(now_.u)), balances.displacement_scale);
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
@@ -88,7 +89,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
     const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
     note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
          1e-8 * there.possible);
-    extents_.force = std::max(extents_.force, ledger.force_scale);
+    extents_.force = std::max(extents_.force, balances.force_scale);
     if (next_.elastic_u && extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
       multiply(operators_.elasticity, change_w, momentum_right_);
       errors_.stress = std::min(errors_.stress, options_.k * largest_entry(momentum_right_) / extents_.force);
@@ -96,9 +97,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
   }
   if (contact_) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
-         largest_entry(surface_.to_nodes(contact.force)), ledger.contact_scale);
+         largest_entry(surface_.to_nodes(contact.force)), balances.contact_scale);
     correction_force_ = change.force;
-    extents_.force = std::max(extents_.force, ledger.force_scale);
+    extents_.force = std::max(extents_.force, balances.force_scale);
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
   }
   if (apply) {
@@ -113,18 +114,18 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Ledger& ledger, Co
 }
 
 template <int d>
-void Stepper<d>::note_temperature(const Ledger& ledger) {
+void Stepper<d>::note_temperature(const Balances& balances) {
   note(errors_.theta, extents_.theta, largest_entry(correction_theta_), largest_entry(next_.theta),
-       ledger.temperature_scale);
+       balances.temperature_scale);
 }
 
 template <int d>
-void Stepper<d>::correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply) {
-  books_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
-  if (!apply) books_.add_rounding(heat_right_, heat_external_);
+void Stepper<d>::correct_heat(const StepInputs& inputs, const Balances& balances, bool apply) {
+  evaluator_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  if (!apply) evaluator_.add_rounding(heat_right_, heat_external_);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
-  note_temperature(ledger);
+  note_temperature(balances);
   if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
 
@@ -137,7 +138,7 @@ void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
   WARMSLIP_PETSC(VecSet(heat_right_, 0));
   if (operators_.heating)
     multiply(operators_.heating, correction_strained_ ? correction_strained_ : correction_w_, heat_right_);
-  fix(heat_right_, operators_.cooled, nullptr);
+  fix(heat_right_, operators_.prescribed_temperature, nullptr);
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   Eigen::VectorXd given = none;
@@ -195,7 +196,7 @@ typename Stepper<d>::Motion Stepper<d>::motion_of(const ContactSolution<d>& cont
 }
 
 template <int d>
-void Stepper<d>::take_back(const Motion& motion, ContactSolution<d>& contact) {
+void Stepper<d>::undo(const Motion& motion, ContactSolution<d>& contact) {
   WARMSLIP_PETSC(VecCopy(motion.w, next_.w));
   if (motion.strained_w) WARMSLIP_PETSC(VecCopy(motion.strained_w, next_.strained_w));
   if (motion.theta) WARMSLIP_PETSC(VecCopy(motion.theta, next_.theta));
@@ -206,20 +207,20 @@ void Stepper<d>::take_back(const Motion& motion, ContactSolution<d>& contact) {
 
 // Refines motion, then heat, as long as it helps; in some steps the digits are estimated although all is well.
 template <int d>
-Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact) {
+Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSolution<d>& contact) {
   const double enough = options_.refinement, rows = enough / options_.row_refinement;
-  const auto warmth = [&] { return std::max(ledger.heat_defect, rows * ledger.heat_residual); };
+  const auto warmth = [&] { return std::max(balances.heat_defect, rows * balances.heat_residual); };
   const auto motion = [&] {
     return std::max(
-        {ledger.force_defect, rows * ledger.force_residual, ledger.law_residual, monolithic() ? warmth() : 0.0});
+        {balances.force_defect, rows * balances.force_residual, balances.law_residual, monolithic() ? warmth() : 0.0});
   };
   // a pass whose change is small says that the one before has done its work
   const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
   const bool creeps = contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
-  if (creeps && correct_motion(loads, ledger, contact, true)) {
-    ledger = balance(complete(loads, contact));
+  if (creeps && correct_motion(loads, balances, contact, true)) {
+    balances = balance(complete(loads, contact));
     ++cost_.refinements;
     errors_ = {};
     for (Extent* field : extents_.all()) field->tried = 0;
@@ -227,23 +228,23 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
     const double rest = motion(), error = errors_.largest();
     const Motion before = motion_of(contact);
-    const bool was_closed = closed(ledger);
-    if (!correct_motion(loads, ledger, contact, true)) break;
-    ledger = balance(complete(loads, contact));
+    const bool was_closed = closed(balances);
+    if (!correct_motion(loads, balances, contact, true)) break;
+    balances = balance(complete(loads, contact));
     ++cost_.refinements;
     refined = true;
-    if (was_closed && !closed(ledger)) {  // it did harm
-      take_back(before, contact);
-      ledger = balance(complete(loads, contact));
+    if (was_closed && !closed(balances)) {  // it did harm
+      undo(before, contact);
+      balances = balance(complete(loads, contact));
       break;
     }
     if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
   }
   for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
     const double rest = warmth();
-    correct_heat(inputs(loads, contact), ledger, true);
+    correct_heat(inputs(loads, contact), balances, true);
     products(next_);
-    ledger = balance(inputs(loads, contact));
+    balances = balance(inputs(loads, contact));
     ++cost_.refinements;
     if (!(warmth() < 0.5 * rest) && warmed && !(errors_.theta < 0.5 * warmer)) break;
     warmer = errors_.theta;
@@ -251,17 +252,17 @@ Ledger Stepper<d>::refine(const StepLoads& loads, Ledger ledger, ContactSolution
   }
   undetermined_ = contact.undetermined;
   const bool wanted = measured_now(loads, contact);
-  if (!wanted && !refined && !warmed) return ledger;
+  if (!wanted && !refined && !warmed) return balances;
   const int before = substitutions();
   const bool moved = momentum_ && (refined || wanted);
-  books_.weigh(now_, next_, inputs(loads, contact));
-  if (moved && !undetermined_) undetermined_ = !correct_motion(loads, ledger, contact, false);
+  evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
+  if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, false);
   if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
-  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), ledger, false);
+  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), balances, false);
   if (heat_ && moved && !undetermined_) add_heat_of_error(loads);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
-  return ledger;
+  return balances;
 }
 
 // Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run

@@ -28,9 +28,9 @@ Eigen::VectorXd row_sizes(Mat a);
 
 /// Largest of some sizes over all ranks.
 template <std::size_t count>
-std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> most) {
-  MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(count), MPI_DOUBLE, MPI_MAX, comm);
-  return most;
+std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> largest) {
+  MPI_Allreduce(MPI_IN_PLACE, largest.data(), static_cast<int>(count), MPI_DOUBLE, MPI_MAX, comm);
+  return largest;
 }
 
 }  // namespace warmslip

@@ -19,7 +19,7 @@ StepReport<d> not_taken(Outcome outcome, const std::string& reason) {
   StepReport<d> report;
   report.outcome = outcome;
   report.reason = reason;
-  Ledger& l = report.ledger;
+  Balances& l = report.balances;
   for (double* unknown :
        {&l.energy_residual, &l.heat_residual, &l.force_residual, &l.law_residual, &l.force_defect, &l.heat_defect})
     *unknown = std::numeric_limits<double>::quiet_NaN();
@@ -42,7 +42,7 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   now_.gap = gap;
   time_ = time;
   extents_ = {};
-  forget();
+  clear_cache();
   if (!rigid_.empty()) {
     WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
     WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));
@@ -78,12 +78,12 @@ void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<
   contact_force_ = now_.contact_force = contact_force;
   status_ = status;
   extents_ = extents;
-  forget();
+  clear_cache();
 }
 
 template <int d>
-void Stepper<d>::forget() {
-  if (contact_) contact_->forget();
+void Stepper<d>::clear_cache() {
+  if (contact_) contact_->clear_cache();
 }
 
 // What the balances read of a step beside its two levels.
@@ -116,24 +116,24 @@ StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>
 }
 
 template <int d>
-Ledger Stepper<d>::balance(const StepInputs& inputs) {
-  const Timed timed(cost_.books_seconds);
-  return books_.close(now_, next_, inputs);
+Balances Stepper<d>::balance(const StepInputs& inputs) {
+  const Timed timed(cost_.balance_seconds);
+  return evaluator_.evaluate(now_, next_, inputs);
 }
 
 template <int d>
-bool Stepper<d>::closed(const Ledger& l) const {
-  const double bound = options_.identity_bound;
+bool Stepper<d>::closed(const Balances& l) const {
+  const double bound = options_.balance_bound;
   return l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
 }
 
-// Only a step that closes its books becomes the state.
+// Only a step whose balances close becomes the state.
 template <int d>
-Outcome Stepper<d>::judge(const Ledger& l) const {
+Outcome Stepper<d>::outcome_of(const Balances& l) const {
   if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.viscous + l.load_work + l.conducted + l.heat_change))
     return Outcome::not_finite;
-  if (!closed(l)) return Outcome::identity_violated;
-  return weighed().largest() <= options_.error_bound ? Outcome::right : Outcome::precision_lost;
+  if (!closed(l)) return Outcome::balance_violated;
+  return weighed().largest() <= options_.error_bound ? Outcome::completed : Outcome::precision_lost;
 }
 
 // Whether PETSc's options put an iterative solver in the place of a factorization.
@@ -142,10 +142,10 @@ bool Stepper<d>::iterative() const {
   return (momentum_ && layout_.sum(momentum_->bytes()) == 0) || (heat_ && layout_.sum(heat_->bytes()) == 0);
 }
 
-// What a step that is not right is told of.
+// The reason for which a step is rejected.
 template <int d>
-std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
-  const double bound = options_.identity_bound;
+std::string Stepper<d>::why(Outcome outcome, const Balances& l) const {
+  const double bound = options_.balance_bound;
   std::string names;
   const auto list = [&](const char* name) { names += (names.empty() ? "" : " and ") + std::string(name); };
   switch (outcome) {
@@ -160,7 +160,7 @@ std::string Stepper<d>::why(Outcome outcome, const Ledger& l) const {
              " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for "
              "double "
              "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other";
-    case Outcome::identity_violated: {
+    case Outcome::balance_violated: {
       for (const auto& [name, residual] : {std::pair{"energy", l.energy_residual}, std::pair{"heat", l.heat_residual},
                                            std::pair{"force", l.force_residual}, std::pair{"law", l.law_residual}})
         if (!(residual <= bound)) list(name);
@@ -212,25 +212,25 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
                                               "no stage of the contact solver reached the law; take smaller steps");
     report.stage = contact.stage;
     report.newton_iterations = contact.iterations;
-    if (finite) report.ledger.law_residual = contact.law_residual;
+    if (finite) report.balances.law_residual = contact.law_residual;
     return report;
   }
   const StepInputs inputs = complete(loads, contact);
   StepReport<d> report = conclude(loads, refine(loads, balance(inputs), contact), contact);
-  if (report.outcome == Outcome::right) cost_.substitutions += substitutions() - before;
+  if (report.outcome == Outcome::completed) cost_.substitutions += substitutions() - before;
   return report;
 }
 
-// Judges the step; one that is right becomes the state.
+// Accepts or rejects the step; an accepted one becomes the state.
 template <int d>
-StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact) {
+StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact) {
   StepReport<d> report;
-  report.ledger = ledger;
+  report.balances = balances;
   report.errors = errors_;
   report.undetermined = undetermined_;
-  report.outcome = judge(ledger);
-  report.reason = why(report.outcome, ledger);
-  if (report.outcome != Outcome::right) return report;
+  report.outcome = outcome_of(balances);
+  report.reason = why(report.outcome, balances);
+  if (report.outcome != Outcome::completed) return report;
 
   for (Extent* field : extents_.all()) field->change = std::max(field->change, field->tried);
   report.stage = contact.stage;

@@ -14,10 +14,10 @@ enum class Coupling { staggered, lagged, monolithic };
 /// `unsupported`: nothing holds the body in a step without inertia. `solver_failed`: a linear solve did not reach its
 /// answer (iterative ones, by PETSc's options).
 enum class Outcome {
-  right,
+  completed,
   contact_not_converged,
   not_finite,
-  identity_violated,
+  balance_violated,
   precision_lost,
   unsupported,
   solver_failed
@@ -28,10 +28,10 @@ struct StepperOptions {
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
-  double refinement = 5e-12;      ///< equations that leave more get iterative refinement, see Ledger::force_defect
-  double row_refinement = 1e-12;  ///< as does a row that leaves more of its own terms, see Ledger::force_residual
+  double refinement = 5e-12;      ///< equations that leave more get iterative refinement, see Balances::force_defect
+  double row_refinement = 1e-12;  ///< as does a row that leaves more of its own terms, see Balances::force_residual
   int passes = 6;                 ///< of it at most, while they help
-  double identity_bound = 1e-10;  ///< a step whose balances leave more is not right, see Ledger::energy_residual
+  double balance_bound = 1e-10;   ///< a step whose balances leave more is rejected, see Balances::energy_residual
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
   int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on, and in
                                   ///< steps that touch the foundation after one that did not
@@ -74,8 +74,8 @@ struct StepLoads {
 
 template <int d>
 struct StepReport {
-  Outcome outcome = Outcome::right;
-  std::string reason;  ///< of an outcome that is not right, in words, where more can be said than its name
+  Outcome outcome = Outcome::completed;
+  std::string reason;  ///< of a step that was rejected, in words, where more can be said than its name
   Stage stage = Stage::none;
   int newton_iterations = 0;
   int open = 0, stick = 0, slip = 0;
@@ -83,7 +83,7 @@ struct StepReport {
   double normal_force = 0;                        ///< int p_nu, force
   Point<d> traction = Point<d>::Zero();           ///< int sigma nu over Gamma_C: the foundation's force on the body
   Point<d> friction_traction = Point<d>::Zero();  ///< its tangential part
-  Ledger ledger{};
+  Balances balances{};
   Errors errors{};
   bool undetermined = false;  ///< a change of the loads has no definite answer
 };
@@ -92,7 +92,7 @@ struct StepReport {
 struct Cost {
   double setup_seconds = 0, step_seconds = 0;  ///< CPU of this process
   /// Parts of step_seconds: solves with their right-hand sides, the contact solver, the balances.
-  double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0, books_seconds = 0;
+  double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0, balance_seconds = 0;
   int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0,
       newton_iterations = 0;
   int estimates = 0;  ///< steps whose digits were estimated, whose substitutions are not among those above
@@ -109,18 +109,18 @@ class Stepper {
   /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
   /// goes on passes the contact forces and statuses of its last step and the extents so far as well, and for a body
   /// without supports how its motion was parted: the next step is then the same to the last bit as that of a stepper
-  /// that was told to `forget` there.
+  /// that was told to `clear_cache` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
   void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldExtents& extents);
   /// After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of
   /// those.
   void part(Vec strained, Vec strained_w, const Eigen::VectorXd& rigid);
   /// Drops what is remembered of earlier steps beside the state.
-  void forget();
-  /// One step. When the outcome is not `right`, the state is the last good one.
+  void clear_cache();
+  /// One step. When the outcome is not `completed`, the state is the last good one.
   StepReport<d> advance(const StepLoads& loads);
 
-  const Level& level() const { return now_; }
+  const TimeLevel& level() const { return now_; }
   double time() const { return time_; }
   int steps() const { return cost_.steps; }
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
@@ -156,31 +156,31 @@ class Stepper {
   Eigen::VectorXd reduce(Vec right, Vec external);
   Eigen::VectorXd expand(const ContactSolution<d>& contact, Vec w, Vec theta);
   void heat_right_side(const StepLoads& loads, Vec heating_w, double scale);
-  StepReport<d> conclude(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact);
-  void products(Level& level) const;
+  StepReport<d> conclude(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact);
+  void products(TimeLevel& level) const;
   bool solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution);
-  void settle(const ContactSolution<d>& contact, Vec w, Vec moved) const;
+  void apply_contact_velocity(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   bool reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact);
   void solve_heat(const StepLoads& loads, Vec heating_w);
   void solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside, Vec out);
   NodalFlow flow(const StepLoads& loads, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) const;
-  Ledger balance(const StepInputs& inputs);
+  Balances balance(const StepInputs& inputs);
   Errors weighed() const;
-  bool closed(const Ledger& ledger) const;
-  Outcome judge(const Ledger& ledger) const;
-  std::string why(Outcome outcome, const Ledger& ledger) const;
+  bool closed(const Balances& balances) const;
+  Outcome outcome_of(const Balances& balances) const;
+  std::string why(Outcome outcome, const Balances& balances) const;
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
   StepInputs inputs(const StepLoads& loads, const ContactSolution<d>& contact) const;
-  Ledger refine(const StepLoads& loads, Ledger ledger, ContactSolution<d>& contact);
-  bool correct_motion(const StepLoads& loads, const Ledger& ledger, ContactSolution<d>& contact, bool apply);
-  void correct_heat(const StepInputs& inputs, const Ledger& ledger, bool apply);
+  Balances refine(const StepLoads& loads, Balances balances, ContactSolution<d>& contact);
+  bool correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool apply);
+  void correct_heat(const StepInputs& inputs, const Balances& balances, bool apply);
   static void note(double& error, Extent& field, double change, double size, double floor);
   bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
   Motion motion_of(const ContactSolution<d>& contact) const;
-  void take_back(const Motion& motion, ContactSolution<d>& contact);
+  void undo(const Motion& motion, ContactSolution<d>& contact);
   Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
-  void note_temperature(const Ledger& ledger);
+  void note_temperature(const Balances& balances);
   void add_heat_of_error(const StepLoads& loads);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
@@ -197,12 +197,12 @@ class Stepper {
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
   StepperOptions options_;
-  Bookkeeper<d> books_;
+  BalanceEvaluator<d> evaluator_;
   double coupled_scale_ = 1;
   std::unique_ptr<Factor> momentum_, heat_;  // monolithic: momentum_ holds both fields
   RigidMotions rigid_, constants_;           // of motion and of heat, where nothing is prescribed
   std::unique_ptr<ContactSolver<d>> contact_;
-  Level now_, next_;
+  TimeLevel now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
   VecHandle correction_strained_;                // the correction but for a rigid motion
   Eigen::VectorXd correction_force_;             // of the contact points

@@ -5,8 +5,8 @@
 
 namespace warmslip {
 
-/// What the ledger reads of one time level; what belongs to an absent block is null or empty.
-struct Level {
+/// What the balances read of one time level; what belongs to an absent block is null or empty.
+struct TimeLevel {
   VecHandle u, w, theta;                      ///< displacement, velocity, temperature
   VecHandle strained, strained_w;             ///< u and w but for rigid motions, where the body has no support
   Eigen::VectorXd rigid;                      ///< and the velocities of the rigid motion that w has besides
@@ -26,14 +26,14 @@ struct Level {
 
 /// Terms of one step in energy (d = 2: per length), as they stand in the balance; each dissipation is >= 0. Those of
 /// absent blocks are zero.
-struct Ledger {
+struct Balances {
   double kinetic, elastic, contact;  ///< stored at the end of the step
   double kinetic_change, elastic_change, contact_change;
   double inertia_damping, elastic_damping, contact_damping;  ///< backward Euler's own dissipation
   double viscous, friction;
   double load_work, expansion_work, gap_work, support_work;  ///< the last: of the reactions of moving supports
-  /// the same balance for theta; `held`: of parts held at a temperature
-  double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, held;
+  /// the same balance for theta; `support_heat`: of parts with a prescribed temperature
+  double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, support_heat;
   /// Backward errors: what a balance leaves over, against the sum of the magnitudes of what was added in it, with
   /// |A| |u| for the products in it. A step that is solved to round-off has round-off here, however small its forces
   /// are. The force residual is the largest over the equations of all nodes (Oettli & Prager, Numer. Math. 6, 1964) and

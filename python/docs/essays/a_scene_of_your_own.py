@@ -53,20 +53,23 @@ print(plan.text(plan.plan(scene)))
 try:
     scene.override(**{"contact.friction.coeficient": 0.3})
 except warmslip.SceneError as refused:
-    said = str(refused)
-print(said)
-assert "did you mean 'coefficient'?" in said
+    message = str(refused)
+print(message)
+assert "did you mean 'coefficient'?" in message
 
 # %% [markdown]
 # ## The loop
 
 # %%
-job = warmslip.Simulation(scene)
-steps = [(state.time, report.normal_force, report.friction_traction[0], report.ledger) for state, report in job.steps()]
+simulation = warmslip.Simulation(scene)
+steps = [
+    (state.time, report.normal_force, report.friction_traction[0], report.balances)
+    for state, report in simulation.steps()
+]
 time, normal, friction, ledgers = (np.array(column, dtype=object) for column in zip(*steps, strict=True))
 time, normal, friction = (column.astype(float) for column in (time, normal, friction))
 lid = 0.03 * np.sin(2 * np.pi * np.maximum(0, time - 0.5))
-assert job.outcome == "right"
+assert simulation.outcome == "completed"
 figure, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 ax.plot(lid, -friction)
 ax.set(xlabel="displacement of the lid", ylabel="force of the drive")
@@ -108,6 +111,6 @@ assert damped < 0.05 * taken
 
 # %%
 finer = warmslip.Simulation(scene.override(**{"time.steps": 400}))
-less = sum(r.ledger.elastic_damping + r.ledger.contact_damping for s, r in finer.steps() if s.time > 1.5 + 1e-9)
+less = sum(r.balances.elastic_damping + r.balances.contact_damping for s, r in finer.steps() if s.time > 1.5 + 1e-9)
 print(f"damping with half the step: {less:.5f}, {less / damped:.2f} of what it was")
 assert 0.45 < less / damped < 0.55

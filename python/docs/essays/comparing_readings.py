@@ -47,8 +47,8 @@ assert [name for name in READINGS if ratio[name]["u_V"] < 1] == ["isotropic"]
 
 # %%
 for name in ("mixed", "consistent"):
-    job = warmslip.Simulation(scenes[name].override(**{FOUNDATION: 10.0, "time.coupling": "monolithic"}))
-    terms = np.array([(report.ledger.expansion_work, report.ledger.heating) for _, report in job.steps()])
+    simulation = warmslip.Simulation(scenes[name].override(**{FOUNDATION: 10.0, "time.coupling": "monolithic"}))
+    terms = np.array([(report.balances.expansion_work, report.balances.heating) for _, report in simulation.steps()])
     together = np.abs(terms.sum(axis=1)).max() / np.abs(terms).max()
     print(f"{name:10s}  |expansion work + heating| over the larger: {together:.1e}")
     assert together < 1e-12 if name == "consistent" else together > 1.9
@@ -82,6 +82,6 @@ assert orders["printed"] < 0.95 < min(orders[name] for name in READINGS[1:])
 
 # %%
 true = [size - 1 / 64 for size in (1 / 16, 1 / 32)]
-shown = np.log2(true[0] / true[1])
-print(f"a true first order shows {shown:.2f}")
-assert np.isclose(shown, np.log2(3))
+display = np.log2(true[0] / true[1])
+print(f"a true first order shows {display:.2f}")
+assert np.isclose(display, np.log2(3))

@@ -19,17 +19,19 @@ cold, hot = (
     for temperature in (0.0, 10.0)
 )
 last = {}
-for name, job in (("cold", cold), ("hot", hot)):
-    for state, report in job.steps():
+for name, simulation in (("cold", cold), ("hot", hot)):
+    for state, report in simulation.steps():
         last[name] = {"u": state.u, "theta": state.theta, "mises": state.mises, "report": report} | state.contact
-    print(f"{name}: {job.outcome}, largest residuals of the balances {max(job.statistics.residuals.values()):.0e}")
+    print(
+        f"{name}: {simulation.outcome}, largest residuals of the balances {max(simulation.statistics.residuals.values()):.0e}"
+    )
 
 # %% [markdown]
-# `Simulation.steps` yields after every step a state, whose arrays are read while it lasts, and a report. Both runs end `right`: energy,
-# heat, forces and the contact law closed in every step, to round-off.
+# `Simulation.steps` yields after every step a state, whose arrays are read while it lasts, and a report. Both runs end
+# `completed`: energy, heat, forces and the contact law closed in every step, to round-off.
 
 # %%
-assert cold.outcome == hot.outcome == "right"
+assert cold.outcome == hot.outcome == "completed"
 assert max(*cold.statistics.residuals.values(), *hot.statistics.residuals.values()) < 1e-11
 
 nodes, cells = np.asarray(cold.discretisation.mesh.nodes), np.asarray(cold.discretisation.mesh.cells)

@@ -43,9 +43,9 @@ scene = warmslip.load("quasistatic_punch")  # a body pressed down by its lid, th
 try:
     warmslip.run(scene, laws={"bottom": Law(compliance=lambda r: (1e4 * r, 1e4, 1e4 * r**2))})
 except ValueError as refused:
-    said = str(refused)
-print(said)
-assert "the third value is the integral of the first" in said
+    message = str(refused)
+print(message)
+assert "the third value is the integral of the first" in message
 
 # %% [markdown]
 # ## First the law that is already there
@@ -55,16 +55,16 @@ assert "the third value is the integral of the first" in said
 
 # %%
 def marched(**laws):
-    job = warmslip.Simulation(scene, laws={"bottom": Law(**laws)} if laws else None)
-    rows = [(s.time, r.normal_force, -r.friction_traction[0], r.max_penetration, r.slip) for s, r in job.steps()]
-    assert job.outcome == "right"
-    return job, np.array(rows).T
+    simulation = warmslip.Simulation(scene, laws={"bottom": Law(**laws)} if laws else None)
+    rows = [(s.time, r.normal_force, -r.friction_traction[0], r.max_penetration, r.slip) for s, r in simulation.steps()]
+    assert simulation.outcome == "completed"
+    return simulation, np.array(rows).T
 
 
-ordinary, told = marched()
+ordinary, output = marched()
 again, same = marched(compliance=lambda r: (1e4 * r, 1e4, 5e3 * r**2), friction=lambda p, v: (0.3 * p, 0.3, 0.0))
-print(f"largest difference of all forces: {np.abs(same - told).max():.0e}")
-assert np.abs(same - told).max() < 1e-12
+print(f"largest difference of all forces: {np.abs(same - output).max():.0e}")
+assert np.abs(same - output).max() < 1e-12
 
 # %% [markdown]
 # ## Rough surfaces
@@ -73,14 +73,14 @@ assert np.abs(same - told).max() < 1e-12
 # either contact; but the deepest penetration is a quarter, and the books close with the energy we wrote.
 
 # %%
-job, stiffening = marched(compliance=rough)
+simulation, stiffening = marched(compliance=rough)
 print(
-    f"normal force {told[1, -1]:.3f} and {stiffening[1, -1]:.3f}, deepest {told[3, -1]:.2e} and {stiffening[3, -1]:.2e}"
+    f"normal force {output[1, -1]:.3f} and {stiffening[1, -1]:.3f}, deepest {output[3, -1]:.2e} and {stiffening[3, -1]:.2e}"
 )
-print(f"worst residual of the energy {job.statistics.residuals['energy']:.0e}")
-assert abs(stiffening[1, -1] / told[1, -1] - 1) < 0.02
-assert 0.2 < stiffening[3, -1] / told[3, -1] < 0.3
-assert max(job.statistics.residuals.values()) < 1e-11
+print(f"worst residual of the energy {simulation.statistics.residuals['energy']:.0e}")
+assert abs(stiffening[1, -1] / output[1, -1] - 1) < 0.02
+assert 0.2 < stiffening[3, -1] / output[3, -1] < 0.3
+assert max(simulation.statistics.residuals.values()) < 1e-11
 
 # %% [markdown]
 # ## Friction that grows with speed
@@ -90,13 +90,13 @@ assert max(job.statistics.residuals.values()) < 1e-11
 # but well below what the speed of the lid would allow.
 
 # %%
-job, slowed = marched(friction=quickening)
+simulation, slowed = marched(friction=quickening)
 reached, allowed = (slowed[2] / slowed[1]).max(), 0.3 + 0.05 * math.log1p(0.02 / 1e-3)
-print(f"Coulomb reaches {(told[2] / told[1]).max():.3f}; the new law {reached:.3f} of at most {allowed:.3f}")
-assert np.isclose((told[2] / told[1]).max(), 0.3) and 0.31 < reached < 0.8 * allowed
-assert slowed[4, -1] < told[4, -1] == 16
+print(f"Coulomb reaches {(output[2] / output[1]).max():.3f}; the new law {reached:.3f} of at most {allowed:.3f}")
+assert np.isclose((output[2] / output[1]).max(), 0.3) and 0.31 < reached < 0.8 * allowed
+assert slowed[4, -1] < output[4, -1] == 16
 figure, ax = plt.subplots(figsize=(6, 3.5), layout="constrained")
-for label, rows in (("Coulomb", told), ("growing with speed", slowed), ("rough", stiffening)):
+for label, rows in (("Coulomb", output), ("growing with speed", slowed), ("rough", stiffening)):
     ax.plot(rows[0], rows[2] / rows[1], label=label)
 ax.set(xlabel="t", ylabel="friction over normal force")
 ax.legend()
@@ -106,6 +106,8 @@ ax.legend()
 # point. Newton's method still needs few iterations, which the summary counts.
 
 # %%
-iterations = {name: run.stepper.cost.newton_iterations for name, run in (("Coulomb", ordinary), ("growing", job))}
-print(iterations, job.statistics.stages)
+iterations = {
+    name: run.stepper.cost.newton_iterations for name, run in (("Coulomb", ordinary), ("growing", simulation))
+}
+print(iterations, simulation.statistics.stages)
 assert iterations["growing"] < 3 * iterations["Coulomb"]

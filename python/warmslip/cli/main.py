@@ -93,18 +93,18 @@ def main() -> None:
 
 def _misused(error: Any) -> str:
     """A sentence about a call that has not the form of the command."""
-    context, said = getattr(error, "ctx", None), " ".join(error.format_message().split()).rstrip(".")
+    context, sentence = getattr(error, "ctx", None), " ".join(error.format_message().split()).rstrip(".")
     if context is None:
-        return f"{said[0].lower()}{said[1:]}; see `warmslip --help`"
-    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)$", said):
+        return f"{sentence[0].lower()}{sentence[1:]}; see `warmslip --help`"
+    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)$", sentence):
         words = extra[1].split()
         if all("=" in word for word in words) and any(one.name == "set_" for one in context.command.params):
             return f"a key of the scene needs --set; write {' '.join(f'--set {word}' for word in words)}"
         return f"'{extra[1]}' is too much for `{context.command_path}`; leave it out, or see its --help"
-    said, near, guess = said.partition(". Did you mean")
+    sentence, near, guess = sentence.partition(". Did you mean")
     if near:
-        return f"{said[0].lower()}{said[1:]}; did you mean{guess}"
-    return f"{said[0].lower()}{said[1:]}; see `{context.command_path} --help`"
+        return f"{sentence[0].lower()}{sentence[1:]}; did you mean{guess}"
+    return f"{sentence[0].lower()}{sentence[1:]}; see `{context.command_path} --help`"
 
 
 def _explain(error: Exception) -> tuple[str, int]:

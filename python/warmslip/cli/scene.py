@@ -58,7 +58,7 @@ def run(
         typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
         for sentence in result.summary["warnings"]:
             console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
-    if not result.right:
+    if not result.completed:
         sys.exit(130 if result.outcome == "interrupted" else 1)  # it has said why
 
 
@@ -82,8 +82,8 @@ def _told(summary: dict[str, Any]) -> str:
     if summary["outcome"] == "interrupted":
         return f"after {summary['steps']} of {summary['stamp']['scene']['time']['steps']} steps, --resume goes on"
     if failure is None:
-        worst = max(summary["identities"][i] for i in ("energy", "heat", "force", "law"))
-        return f"{summary['steps']} steps, worst identity {worst:.1e}, {_digits(summary['digits'])}"
+        worst = max(summary["balances"][i] for i in ("energy", "heat", "force", "law"))
+        return f"{summary['steps']} steps, largest balance residual {worst:.1e}, {_digits(summary['digits'])}"
     words = [failure["reason"]] if failure["reason"] else []
     words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason", "digits")]
     if "digits" in failure:
@@ -109,7 +109,7 @@ def export(
             fields=names,
             times=_times(times),
             progress=lambda n, total: bar.update(task, completed=n, total=total),
-            say=lambda words: console.print(f"note: {words}", highlight=False, soft_wrap=True, markup=False),
+            warn=lambda words: console.print(f"note: {words}", highlight=False, soft_wrap=True, markup=False),
         )
     body, points = ((out / f"{name}.pvd").exists() for name in ("body", "contact"))
     where = f"{out}/body.pvd" if body else f"{out}/contact.pvd" if points else str(out)

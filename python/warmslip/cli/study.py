@@ -11,6 +11,7 @@ import typer
 
 from warmslip.cli.options import SceneName, Set, progress_bar
 from warmslip.figures import KINDS
+from warmslip.records import tables
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.full import full_model
@@ -44,11 +45,11 @@ def study(
     out: Csv,
     levels: Annotated[
         str,
-        typer.Option(help="bricks along the first axis, and steps; of a file, pieces of an edge and of a step: 1,2,4"),
+        typer.Option(help="cells along the first axis, and steps; of a file, pieces of an edge and of a step: 1,2,4"),
     ] = "16,32,64,128",
-    reference: Annotated[int, typer.Option(help="bricks and steps of the solution taken as exact")] = 256,
+    reference: Annotated[int, typer.Option(help="cells and steps of the solution taken as exact")] = 256,
     grid: Annotated[str, typer.Option(help="diagonal (h = k) or full")] = "diagonal",
-    pace: Annotated[
+    steps_per_level: Annotated[
         int | None, typer.Option(help="steps of level 1; default 1, for a mesh from a file the scene's time.steps")
     ] = None,
     set_: Set = None,
@@ -69,11 +70,13 @@ def study(
             levels=sizes,
             reference=reference,
             grid=grid,
-            pace=pace,
+            steps_per_level=steps_per_level,
             progress=lambda n, total: bar.update(task, completed=n, total=total),
         )
-    refinement_study.write(
-        out, rows, refinement_study.stamp(checked, levels=levels, reference=reference, grid=grid, pace=pace)
+    tables.write(
+        out,
+        rows,
+        refinement_study.stamp(checked, levels=levels, reference=reference, grid=grid, steps_per_level=steps_per_level),
     )
 
 
@@ -90,12 +93,12 @@ def manufactured(
     _writable(out)
     rows = made.table(checked, ["staggered", "lagged", "monolithic"], _levels(levels), "h=k")
     rows += made.table(checked, ["staggered"], _levels(levels), "k=h^2")
-    refinement_study.write(out, rows, refinement_study.stamp(checked, levels=levels))
+    tables.write(out, rows, refinement_study.stamp(checked, levels=levels))
 
 
 def extremes(
     out: Csv,
-    n: Annotated[int, typer.Option(help="bricks a side")] = 16,
+    n: Annotated[int, typer.Option(help="cells per side")] = 16,
     steps: Annotated[int, typer.Option(help="time steps")] = 16,
     scene: Annotated[str, typer.Option(help="the scene whose parameters climb the ladders")] = "paper_isotropic",
     set_: Set = None,
@@ -104,7 +107,7 @@ def extremes(
     from warmslip.studies import refinement_study, robustness
 
     checked = full_model(reader.load(scene, [f"mesh.n={n}", f"time.steps={steps}", *(set_ or [])]))
-    refinement_study.write(_writable(out), robustness.table(checked), refinement_study.stamp(checked))
+    tables.write(_writable(out), robustness.table(checked), refinement_study.stamp(checked))
 
 
 def blocks(
@@ -112,7 +115,7 @@ def blocks(
     explained: Annotated[
         Path, typer.Option(help="another CSV: what `explain` says of the library and what its runs take")
     ],
-    n: Annotated[int, typer.Option(help="bricks a side")] = 96,
+    n: Annotated[int, typer.Option(help="cells per side")] = 96,
     steps: Annotated[int, typer.Option(help="time steps of every combination, a multiple of 5")] = 30,
 ) -> None:
     """Measure what every combination of blocks costs, against the whole model and against the least code."""
@@ -125,27 +128,26 @@ def blocks(
     with progress_bar() as bar:
         task = bar.add_task("combinations", total=None, note="")
         rows = block_cost.table(n, steps, lambda done, total: bar.update(task, completed=done, total=total))
-        refinement_study.write(out, rows, stamp)
+        tables.write(out, rows, stamp)
         task = bar.add_task("library", total=None, note="")
         rows = cost.table(progress=lambda done, total: bar.update(task, completed=done, total=total))
-        refinement_study.write(explained, rows, refinement_study.stamp(None))
+        tables.write(explained, rows, refinement_study.stamp(None))
 
 
 def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
     """Writes a table made from other tables; ValueError when those are not what they should be."""
     from warmslip.records import provenance
-    from warmslip.studies import refinement_study
 
     names = [p.name for p in sources]
     try:
         rows = make()
     except (LookupError, TypeError, UnicodeDecodeError, ZeroDivisionError) as error:
         raise ValueError(f"{', '.join(names)}: not tables that `warmslip study` wrote ({error!r})") from error
-    refinement_study.write(out, rows, provenance.stamp(sources=names))
+    tables.write(out, rows, provenance.stamp(sources=names))
 
 
 def rates(tables: Tables, out: Csv) -> None:
-    """Observed, bias-corrected and entitled orders of studies."""
+    """Observed, bias-corrected and expected orders of studies."""
     from warmslip.studies import rates as orders
 
     _derived(out, lambda: [row for path in tables for row in orders.table(path, _scene_of(path))], tables)
@@ -208,8 +210,8 @@ def judge(
         f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
     )
     for name in result["failed"]:
-        detail = next(d for d in result["details"] if d["name"] == name)
-        typer.echo(f"  {name}: {detail['value']} not in [{detail['low']}, {detail['high']}]", err=True)
+        detail = next(d for d in result["details"] if d["case"] == name)
+        typer.echo(f"  {name}: {detail['observed']} not in [{detail['low']}, {detail['high']}]", err=True)
     if fail and not result["passed"]:
         raise typer.Exit(1)
 

@@ -36,14 +36,14 @@ def check(
 
 def verify(
     topic: Annotated[str, typer.Argument(help="a topic of the report, or `list`")],
-    out: Annotated[Path, typer.Option(help="the CSV of lines to write; tables and stamp go beside it")] = Path(
-        "lines.csv"
+    out: Annotated[Path, typer.Option(help="the CSV of checks to write; tables and stamp go beside it")] = Path(
+        "checks.csv"
     ),
-    fail: Annotated[bool, typer.Option(help="exit 1 when a line is out of its band")] = True,
+    fail: Annotated[bool, typer.Option(help="exit 1 when a check is out of its band")] = True,
 ) -> None:
-    """Verify one topic: each line says what it proves, where the expected number comes from, and whether it holds."""
+    """Verify one topic: each check says what it proves, where the expected number comes from, and whether it holds."""
+    from warmslip.records import check as checks
     from warmslip.studies.refinement_study import stamp
-    from warmslip.verification import check as line
     from warmslip.verification.suite import TOPICS
 
     if topic == "list":
@@ -53,26 +53,26 @@ def verify(
     if topic not in TOPICS:
         raise ValueError(f"unknown topic '{topic}'; give one of {', '.join(TOPICS)}")
     found = TOPICS[topic](out.parent)
-    passed = line.write(out, found, stamp(None, title=title(TOPICS[topic])))
+    passed = checks.write(out, found, stamp(None, title=title(TOPICS[topic])))
     for one in found:
         if not one.passed:
             typer.echo(
                 f"  {one.case}: {one.proves}: {one.observed:.6g} not in [{one.low:.6g}, {one.high:.6g}]", err=True
             )
-    typer.echo(f"{'passed' if passed else 'FAILED'}: {sum(o.passed for o in found)} of {len(found)} lines")
+    typer.echo(f"{'passed' if passed else 'FAILED'}: {sum(o.passed for o in found)} of {len(found)} checks")
     if fail and not passed:
         raise typer.Exit(1)
 
 
 def report(
-    tables: Annotated[list[Path], typer.Argument(help="lines written by `warmslip verify`")],
+    tables: Annotated[list[Path], typer.Argument(help="checks written by `warmslip verify`")],
     out: Annotated[Path, typer.Option(help="the Markdown file to write")],
     figures: Annotated[list[Path] | None, typer.Option(help="a figure to show, any number of times")] = None,
     audits: Annotated[list[Path] | None, typer.Option(help="written by `warmslip check`, any number of times")] = None,
     faults: Annotated[Path | None, typer.Option(help="written by `make mutants`")] = None,
-    fail: Annotated[bool, typer.Option(help="exit 1 when a line is out of its band")] = True,
+    fail: Annotated[bool, typer.Option(help="exit 1 when a check is out of its band")] = True,
 ) -> None:
-    """Put the lines of all topics into one report."""
+    """Put the checks of all topics into one report."""
     from warmslip.verification import report as writing
 
     text, passed = writing.markdown(tables, figures or [], audits or [], faults)

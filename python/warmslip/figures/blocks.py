@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILLION, column, grid_lines, number, rows
+from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILLION, column, grid_lines, number
+from warmslip.records import tables
 
 COLOURS = dict(
     zip(
@@ -26,12 +27,12 @@ MARKERS = {"none": "o", "frictionless": "s", "friction": "^"}
 
 def blocks(inputs: list[Path]) -> tuple[Figure, str]:
     """Left: a step over one of the whole model, by what is there. Right: a step against the least code that could do it."""
-    lines = rows(inputs[0])
+    lines = tables.texts(inputs[0])
     figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.0), width_ratios=(1.5, 1))
-    said = [_matrix(left, lines), _floor(right, lines)]
+    message = [_matrix(left, lines), _floor(right, lines)]
     return figure, (
-        f"Cost of a step of {len(lines)} combinations of blocks, medians on one process, {lines[0]['bricks']} bricks a "
-        f"side. {said[0]} {said[1]}"
+        f"Cost of a step of {len(lines)} combinations of blocks, medians on one process, {lines[0]['cells_per_side']} cells a "
+        f"side. {message[0]} {message[1]}"
     )
 
 
@@ -66,7 +67,7 @@ def _matrix(ax: Axes, lines: list[dict[str, str]]) -> str:
 def _floor(ax: Axes, lines: list[dict[str, str]]) -> str:
     least = 1e3 * column(lines, "least")
     for i, line in enumerate(lines):
-        for name, face in (("over_least", "white"), ("over_floor", COLOURS[line["motion"]])):
+        for name, face in (("linear_over_minimal", "white"), ("step_over_minimal", COLOURS[line["motion"]])):
             middle, low, high = (float(line[name + end]) for end in ("", "_lower", "_upper"))
             colour = COLOURS[line["motion"]]
             ax.plot([least[i]] * 2, [low, high], "-", color=colour, lw=0.6, alpha=0.6, zorder=1)
@@ -95,7 +96,7 @@ def _floor(ax: Axes, lines: list[dict[str, str]]) -> str:
     ]
     ax.legend(handles=handles, loc="upper right", fontsize=7, ncols=2)
     ax.set_title("step against the least code for the same physics")
-    bare, over = column(lines, "over_least"), column(lines, "over_floor")
+    bare, over = column(lines, "linear_over_minimal"), column(lines, "step_over_minimal")
     share = column(lines, "balances") / column(lines, "step")
     return (
         f"Right, hollow: without its contact solver and its balances a step takes {number(float(bare.min()), 2)} to "

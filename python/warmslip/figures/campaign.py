@@ -27,8 +27,8 @@ from warmslip.figures.style import (
     column,
     grid_lines,
     number,
-    rows,
 )
+from warmslip.records import tables
 
 CLASSES = {
     "right": (SKY, "right"),
@@ -72,7 +72,7 @@ BINS = 6
 
 def campaign(inputs: list[Path]) -> tuple[Figure, str]:
     """Shares of the classes by family, the failures over step and stiffness, and the share that is not right along every axis."""
-    lines = rows(inputs[0])
+    lines = tables.texts(inputs[0])
     figure = plt.figure(figsize=(10.5, 10.2))
     halves: Any = figure.subfigures(2, 1, height_ratios=[0.42, 0.58])
     top, bottom = halves
@@ -84,12 +84,12 @@ def campaign(inputs: list[Path]) -> tuple[Figure, str]:
     figure.legend(handles=handles, loc="outside upper center", ncols=min(4, len(handles)))
     count = Counter(line["class"] for line in lines)
     posed = sum(count[name] for name in POSED)
-    said = "; ".join(f"{n} {CLASSES[name][1]}" for name, n in count.most_common())
+    message = "; ".join(f"{n} {CLASSES[name][1]}" for name, n in count.most_common())
     return figure, (
         f"The campaign: {len(lines)} scenes that fill the space of data evenly, each judged by a solver in 80 digits. Above "
         "left, what became of them, by family; above right, the well-posed ones over step and contact stiffness, those that "
         "did not end right in colour; below, how many per cent of the well-posed ones did not end right, along every axis. "
-        f"All: {said}. Of {posed} well-posed scenes {number(100 * count['right'] / max(1, posed))} % ended right."
+        f"All: {message}. Of {posed} well-posed scenes {number(100 * count['right'] / max(1, posed))} % ended right."
     )
 
 
@@ -170,7 +170,7 @@ def _binned(name: str, lines: list[dict[str, str]]) -> list[tuple[str, list[dict
 
 def envelope(inputs: list[Path]) -> tuple[Figure, str]:
     """A bar from the smallest to the largest value that runs right, for every axis and scene."""
-    lines = rows(inputs[0])
+    lines = tables.texts(inputs[0])
     scenes = list(dict.fromkeys(line["scene"] for line in lines))
     figure, panels = plt.subplots(1, len(scenes), figsize=(2.9 * len(scenes) + 1.2, 4.6), sharey=True, squeeze=False)
     names = list(dict.fromkeys(line["axis"] for line in lines))

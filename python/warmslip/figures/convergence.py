@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from warmslip.figures.style import GREY, INK, PALE, SUMS, TERMS, case, column, grid_lines, number, rows
+from warmslip.figures.style import GREY, INK, PALE, SUMS, TERMS, case, column, grid_lines, number
+from warmslip.records import tables
 
 # the legible ticks of the paper's figure 5
 TICKS_X, TICKS_Y = (0.025, 0.05, 0.1), (5e-3, 1e-2, 5e-2, 1e-1, 1.5e-1)
@@ -21,14 +22,16 @@ MORE_X, MORE_Y = (0.2, 0.5), (1e-5, 5e-5, 1e-4, 5e-4, 1e-3, 0.5, 1.0, 5.0)
 def diagonal(path: Path) -> list[dict[str, str]]:
     """The lines of a study with h = k that have an error, coarse to fine."""
     case(path)  # raises for a study that is not one of the workflow
-    lines = [line for line in rows(path) if line["n"] == line["steps"] and np.isfinite(float(line["e_u_V"]))]
+    lines = [line for line in tables.texts(path) if line["n"] == line["steps"] and np.isfinite(float(line["e_u_V"]))]
     return sorted(lines, key=lambda line: int(line["n"]))
 
 
 def ticks(axis: Any, paper: tuple[float, ...], more: tuple[float, ...], low: float, high: float) -> None:
     """The paper's ticks, and further ones only where the data leave them."""
-    shown = [t for t in sorted({*paper, *more}) if low <= t <= high and (t in paper or not min(paper) < t < max(paper))]
-    axis.set_major_locator(FixedLocator(shown))
+    display = [
+        t for t in sorted({*paper, *more}) if low <= t <= high and (t in paper or not min(paper) < t < max(paper))
+    ]
+    axis.set_major_locator(FixedLocator(display))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(lambda value, _: number(value))
 
@@ -42,15 +45,15 @@ def triangle(ax: Any, low: float, high: float, level: float) -> None:
 
 def errors(inputs: list[Path]) -> tuple[Figure, str]:
     """Figure 5: the estimated errors against h+k, each term and both sums; one study a panel."""
-    tables = [diagonal(path) for path in inputs]
+    loaded = [diagonal(path) for path in inputs]
     figure, axes = plt.subplots(
-        1, len(tables), figsize=(3.9 * len(tables), 4.4), sharex=True, sharey=True, squeeze=False
+        1, len(loaded), figsize=(3.9 * len(loaded), 4.4), sharex=True, sharey=True, squeeze=False
     )
-    every = np.concatenate([column(t, f"e_{name}") for t in tables for name in {**TERMS, **SUMS}])
-    steps = np.concatenate([column(t, "h") + column(t, "k") for t in tables])
+    every = np.concatenate([column(t, f"e_{name}") for t in loaded for name in {**TERMS, **SUMS}])
+    steps = np.concatenate([column(t, "h") + column(t, "k") for t in loaded])
     x = steps.min() / 1.25, steps.max() * 1.25
     y = min(every.min() / 3.2, 4.5e-3), max(every.max() * 1.4, 1.7e-1)
-    for ax, table, path in zip(axes[0], tables, inputs, strict=True):
+    for ax, table, path in zip(axes[0], loaded, inputs, strict=True):
         size = column(table, "h") + column(table, "k")
         ax.axhspan(TICKS_Y[0], TICKS_Y[-1], fc=PALE, zorder=0)
         for name, (label, colour, marker) in {**TERMS, **SUMS}.items():
@@ -75,15 +78,15 @@ def errors(inputs: list[Path]) -> tuple[Figure, str]:
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, columnspacing=1.1, handlelength=2
     )
-    said = [spoken(table, case(path).theta) for table, path in zip(tables, inputs, strict=True)]
-    reference = max(int(line["n"]) for line in rows(inputs[0]))
+    message = [spoken(table, case(path).theta) for table, path in zip(loaded, inputs, strict=True)]
+    reference = max(int(line["n"]) for line in tables.texts(inputs[0]))
     head = (
         f"Reading '{case(inputs[0]).reading}', {case(inputs[0]).coupling} coupling: estimated errors against h + k as "
-        f"in the paper's figure 5, h = k from 1/{tables[0][0]['n']} to 1/{tables[0][-1]['n']}, the solution at "
+        f"in the paper's figure 5, h = k from 1/{loaded[0][0]['n']} to 1/{loaded[0][-1]['n']}, the solution at "
         f"1/{reference} standing in for the exact one. Ticks are the paper's where it has them, the grey band is the "
         "range of its ticks."
     )
-    return figure, " ".join([head, *said])
+    return figure, " ".join([head, *message])
 
 
 def spoken(table: list[dict[str, str]], theta: str) -> str:
@@ -103,14 +106,14 @@ def mean_order(table: list[dict[str, str]], name: str) -> float:
 
 
 def corrected(inputs: list[Path]) -> tuple[Figure, str]:
-    """Observed and bias-corrected orders against the entitled ones. Inputs: the rates, then the studies to show."""
-    rates, studies = rows(inputs[0]), inputs[1:]
+    """Observed and bias-corrected orders against the expected ones. Inputs: the rates, then the studies to show."""
+    rates, studies = tables.texts(inputs[0]), inputs[1:]
     figure, axes = plt.subplots(
         1, len(studies), figsize=(3.9 * len(studies), 4.2), sharex=True, sharey=True, squeeze=False
     )
-    said = []
+    message = []
     for ax, path in zip(axes[0], studies, strict=True):
-        said.append(orders(ax, [line for line in rates if line["case"] == path.stem], case(path).theta))
+        message.append(orders(ax, [line for line in rates if line["case"] == path.stem], case(path).theta))
         ax.set(xlabel="$h = k$", title=case(path).panel)
         grid_lines(ax)
     bottom, top = axes[0, 0].get_ylim()
@@ -124,15 +127,15 @@ def corrected(inputs: list[Path]) -> tuple[Figure, str]:
     kinds = [
         Line2D([], [], color=GREY, ls=":", marker="o", mfc="white", label="observed"),
         Line2D([], [], color=GREY, marker="o", label="bias removed"),
-        Line2D([], [], color=GREY, lw=4, alpha=0.35, label="entitled"),
+        Line2D([], [], color=GREY, lw=4, alpha=0.35, label="expected"),
     ]
     figure.legend(handles=[*names, *kinds], loc="outside lower center", ncols=6, columnspacing=1.1, handlelength=2)
     head = (
         f"Reading '{case(studies[0]).reading}': orders between successive h = k. Dotted: as observed against the "
         "finest solution, which flatters the last ones; solid: with that bias removed; wide pale lines: the order "
-        "that the problem is entitled to."
+        "that the problem is expected to."
     )
-    return figure, " ".join([head, *said])
+    return figure, " ".join([head, *message])
 
 
 def orders(ax: Any, lines: list[dict[str, str]], theta: str) -> str:
@@ -140,12 +143,12 @@ def orders(ax: Any, lines: list[dict[str, str]], theta: str) -> str:
     parts = []
     for name, (_, colour, marker) in TERMS.items():
         own = sorted((line for line in lines if line["term"] == name), key=lambda line: -float(line["h"]))
-        h, entitled = column(own, "h"), column(own, "entitled")
-        ax.plot(h, entitled, color=colour, lw=5, alpha=0.25, solid_capstyle="butt")
+        h, expected = column(own, "h"), column(own, "expected")
+        ax.plot(h, expected, color=colour, lw=5, alpha=0.25, solid_capstyle="butt")
         ax.plot(h, column(own, "observed"), color=colour, ls=":", marker=marker, mfc="white")
         ax.plot(h, column(own, "corrected"), color=colour, marker=marker, mec="white", mew=0.5)
         last = own[-1]
         parts.append(
-            f"{name} {float(last['observed']):.2f} / {float(last['corrected']):.2f} / {float(last['entitled']):.2f}"
+            f"{name} {float(last['observed']):.2f} / {float(last['corrected']):.2f} / {float(last['expected']):.2f}"
         )
-    return f"For theta_F = {theta}, finest pair, observed / corrected / entitled: {', '.join(parts)}."
+    return f"For theta_F = {theta}, finest pair, observed / corrected / expected: {', '.join(parts)}."

@@ -13,14 +13,15 @@ from matplotlib.colors import LogNorm, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from warmslip.figures.style import GREY, INK, ORANGE, PALE, PURPLE, SKY, TERMS, VERMILLION, case, column, number, rows
+from warmslip.figures.style import GREY, INK, ORANGE, PALE, PURPLE, SKY, TERMS, VERMILLION, case, column, number
+from warmslip.records import tables
 
 OUTCOMES = {
     "right": SKY,
     "refused": PALE,
     "contact_not_converged": ORANGE,
     "not_finite": PURPLE,
-    "identity_violated": VERMILLION,
+    "balance_violated": VERMILLION,
 }
 CLAIMS = {"yes": SKY, "no": ORANGE}
 BALANCES = ("energy", "heat", "force", "law")
@@ -30,9 +31,9 @@ def grid(inputs: list[Path]) -> tuple[Figure, str]:
     """Errors of every term over h and k refined separately; one study a row."""
     size = (3.0 * len(TERMS) + 0.6, 2.75 * len(inputs) + 0.4)
     figure, axes = plt.subplots(len(inputs), len(TERMS), figsize=size, squeeze=False)
-    said = []
+    message = []
     for line, path in zip(axes, inputs, strict=True):
-        table = rows(path)
+        table = tables.texts(path)
         n, steps = column(table, "n").astype(int), column(table, "steps").astype(int)
         meshes, clocks = np.unique(n), np.unique(steps)
         for ax, (name, (label, _, _)) in zip(line, TERMS.items(), strict=True):
@@ -43,7 +44,7 @@ def grid(inputs: list[Path]) -> tuple[Figure, str]:
             ax.set_yticks(range(len(meshes)), [f"1/{m}" for m in meshes])
             ax.set_title(f"{label},  {case(path).panel}")
             ax.set(xlabel="$k$", ylabel="$h$")
-            said.append(
+            message.append(
                 f"{name}, theta_F = {case(path).theta}: {number(values[0, -1])} at the coarsest h and finest k, "
                 f"{number(values[-1, 0])} at the finest h and coarsest k."
             )
@@ -51,7 +52,7 @@ def grid(inputs: list[Path]) -> tuple[Figure, str]:
         f"Reading '{case(inputs[0]).reading}', {case(inputs[0]).coupling} coupling: largest error over time against "
         "the reference (the empty cell) with h and k refined separately. Colours are logarithmic, one scale a panel."
     )
-    return figure, " ".join([head, *said])
+    return figure, " ".join([head, *message])
 
 
 def heat_map(ax: Any, values: Any) -> None:
@@ -69,7 +70,7 @@ def heat_map(ax: Any, values: Any) -> None:
 
 def table(inputs: list[Path]) -> tuple[Figure, str]:
     """A table as it stands, turned over when it is wide; 'yes' and 'no' are coloured, numbers shortened."""
-    lines = rows(inputs[0])
+    lines = tables.texts(inputs[0])
     names = [name.replace("_", " ") for name in lines[0]]
     body = [[shortened(value) for value in line.values()] for line in lines]
     turned = len(names) > 12
@@ -95,14 +96,14 @@ def table(inputs: list[Path]) -> tuple[Figure, str]:
                 )
                 ax.add_patch(box)
             ax.text((left[i] + left[i + 1]) / 2, height * (j + 0.5), row[i], ha="center", va="center", fontsize=8.5)
-    said = [
+    message = [
         f"{line[0]} satisfies {line.count('yes')} of {line.count('yes') + line.count('no')} claims, not: "
         f"{', '.join(name for name, cell in zip(names, line, strict=True) if cell.startswith('no')) or 'none'}."
         for line in body
     ]
     return (
         figure,
-        f"Which reading of the paper satisfies which of its claims, computed from the studies: {' '.join(said)}",
+        f"Which reading of the paper satisfies which of its claims, computed from the studies: {' '.join(message)}",
     )
 
 
@@ -116,8 +117,8 @@ def shortened(text: str) -> str:
 
 
 def extremes(inputs: list[Path]) -> tuple[Figure, str]:
-    """Ladders down, their values along; colour says the outcome, the number below is the worst identity."""
-    lines = rows(inputs[0])
+    """Ladders down, their values along; colour says the outcome, the number below is the largest residual of a balance."""
+    lines = tables.texts(inputs[0])
     ladders: dict[str, list[dict[str, str]]] = {}
     for line in lines:
         ladders.setdefault(line["ladder"], []).append(line)
@@ -145,22 +146,22 @@ def extremes(inputs: list[Path]) -> tuple[Figure, str]:
         for name, count in counts.items()
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    right = [line for line in lines if line["outcome"] == "right"]
+    right = [line for line in lines if line["outcome"] == "completed"]
     top = max(right, key=worst, default=None)
-    said = (
-        f" Worst identity among the right ones: {number(worst(top))} at {top['ladder']} = {top['value']}."
+    message = (
+        f" Largest residual of a balance among the completed ones: {number(worst(top))} at {top['ladder']} = {top['value']}."
         if top
         else ""
     )
     wrong = sum(line["verdict"] == "WRONG" for line in lines)
-    said += (
+    message += (
         f" {wrong or 'None'} of the runs {'are' if wrong > 1 else 'is'} silently wrong{' (framed)' if wrong else ''}."
     )
     total = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items())
     return figure, (
         f"The paper's problem pushed to extremes, one datum at a time: {len(lines)} runs, {total}. In each cell the "
         "value and, below it, the worst relative residual of the energy, heat, force and friction-law "
-        f"identities.{said}"
+        f"balances.{message}"
     )
 
 
@@ -172,13 +173,13 @@ def brief(text: str) -> str:
 
 
 def worst(line: dict[str, str]) -> float:
-    """The largest identity residual of a run, nan when it has none."""
+    """The largest residual of a balance of a run, nan when it has none."""
     found = [float(line[name]) for name in BALANCES if line.get(name)]
     return max((value for value in found if np.isfinite(value)), default=float("nan"))
 
 
 def worst_text(line: dict[str, str]) -> str:
-    """The worst identity."""
+    """The largest residual of a balance."""
     value = worst(line)
     if not np.isfinite(value):
         return ""

@@ -144,7 +144,7 @@ def bodies(body: Body, factor: float) -> tuple[Figure, str]:
     grid = figure.add_gridspec(1, len(names))
     for i, name in enumerate(names):
         panel(figure, grid[i], body, name, factor=factor, norm=norm_of([body], name))
-    said = [f"{name} {number(float(v.min()))} to {number(float(v.max()))}" for name, v in body.fields.items()]
+    message = [f"{name} {number(float(v.min()))} to {number(float(v.max()))}" for name, v in body.fields.items()]
     points = ""
     if body.dim == 2 and "von Mises stress" in body.fields:
         points = "; the von Mises stress counts that along z, 0 in plane stress"
@@ -155,7 +155,7 @@ def bodies(body: Body, factor: float) -> tuple[Figure, str]:
         if body.dim == 2:
             points += f" ({COLOURS_OF_STATUS})"
     dashed = ", dashed the undeformed outline" * (body.dim == 2)
-    return figure, f"The body at t = {number(body.time)}{magnified}{dashed}: {'; '.join(said)}{points}."
+    return figure, f"The body at t = {number(body.time)}{magnified}{dashed}: {'; '.join(message)}{points}."
 
 
 def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, str]:
@@ -174,16 +174,16 @@ def contact(parts: dict[str, dict[str, Array]], time: float) -> tuple[Figure, st
                 ax.axhline(0, color=GREY, lw=0.5)
                 ax.set_xlabel("along the part")
             else:
-                shown = ax.scatter(*x.T, c=values, cmap=cm.batlow, s=14)
-                figure.colorbar(shown, ax=ax, shrink=0.8)
+                display = ax.scatter(*x.T, c=values, cmap=cm.batlow, s=14)
+                figure.colorbar(display, ax=ax, shrink=0.8)
                 ax.set_aspect("equal")
             ax.set_title(f"{part}: {name}")
     largest = [f"{part} {number(float(f['pressure'].max()))}" for part, f in parts.items()]
-    told = f"Contact at t = {number(time)}"
+    output = f"Contact at t = {number(time)}"
     if any(fields["position"].ndim == 1 for fields in parts.values()):
         legend_of_status(figure)
-        told += f"; points that are open, stick, slip are {COLOURS_OF_STATUS}"
-    return figure, f"{told}. Largest pressure: {', '.join(largest)}."
+        output += f"; points that are open, stick, slip are {COLOURS_OF_STATUS}"
+    return figure, f"{output}. Largest pressure: {', '.join(largest)}."
 
 
 def history(time: Array, panels: dict[str, dict[str, Array]]) -> tuple[Figure, str]:

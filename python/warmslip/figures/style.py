@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -75,12 +74,6 @@ def case(name: str | Path) -> Case:
 def applied() -> AbstractContextManager[None]:
     """The style, for a `with`."""
     return mpl.rc_context(_RC)
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    """The lines of a table, in order."""
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def column(table: list[dict[str, str]], name: str) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -23,8 +23,8 @@ from warmslip.figures.style import (
     column,
     grid_lines,
     number,
-    rows,
 )
+from warmslip.records import tables
 
 COLOURS = {"staggered": BLUE, "lagged": VERMILLION, "monolithic": GREEN}
 MARKERS = {"nodal": "o"}  # any other quadrature: a diamond
@@ -32,7 +32,7 @@ MARKERS = {"nodal": "o"}  # any other quadrature: a diamond
 
 def work(inputs: list[Path]) -> tuple[Figure, str]:
     """Error against CPU seconds, one panel a problem, its front joined and named by 1/h, 1/k."""
-    lines = rows(inputs[0])
+    lines = tables.texts(inputs[0])
     cases = {line["case"]: case(line["case"]) for line in lines}
     readings, temperatures = (
         list(dict.fromkeys(c.reading for c in cases.values())),
@@ -42,11 +42,11 @@ def work(inputs: list[Path]) -> tuple[Figure, str]:
     figure, axes = plt.subplots(
         len(temperatures), len(readings), figsize=size, sharex=True, sharey="row", squeeze=False
     )
-    said = []
+    message = []
     for i, theta in enumerate(temperatures):
         for j, reading in enumerate(readings):
             own = [line for line in lines if cases[line["case"]][:2] == (reading, theta)]
-            said.append(panel(axes[i, j], own, cases, f"{reading}, theta_F = {theta}"))
+            message.append(panel(axes[i, j], own, cases, f"{reading}, theta_F = {theta}"))
             axes[i, j].set_title(rf"{reading}, $\theta_F = {theta}$")
         axes[i, 0].set_ylabel("error of $u$, $w$, $\\theta$")
         axes[i, 0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -65,9 +65,9 @@ def work(inputs: list[Path]) -> tuple[Figure, str]:
         f"{len(lines)} runs. The front joins the runs than which no other of the same "
         "problem is both cheaper and more accurate. Errors are distances to the finest solution of the same coupling, so "
         "that none below the error of that solution itself means more accuracy: where the start is sudden (theta_F = 10) the "
-        "right ends of the fronts lie below it (results/verification, true_orders)."
+        "right ends of the fronts lie below it (results/verification, convergence)."
     )
-    return figure, " ".join([head, *filter(None, said)])
+    return figure, " ".join([head, *filter(None, message)])
 
 
 def panel(ax: Any, lines: list[dict[str, str]], cases: dict[str, Case], title: str) -> str:

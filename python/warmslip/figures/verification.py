@@ -11,15 +11,16 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from warmslip.figures.convergence import triangle
-from warmslip.figures.style import GREY, TERMS, column, grid_lines, number, rows
+from warmslip.figures.style import GREY, TERMS, column, grid_lines, number
+from warmslip.records import tables
 
 
 def graded(inputs: list[Path]) -> tuple[Figure, str]:
     """Errors on uniform and on graded grids with the reference's own error added back; one table a panel of each kind."""
-    table = rows(inputs[0])
+    table = tables.texts(inputs[0])
     kinds = {"uniform": "uniform mesh, $k = h$", "graded": "graded mesh and steps, largest $k = 4h$"}
     figure, axes = plt.subplots(1, 2, figsize=(7.8, 4.2), sharex=True, sharey=True)
-    said = []
+    message = []
     for ax, (kind, title) in zip(axes, kinds.items(), strict=True):
         lines = [line for line in table if line["grids"] == kind]
         h = column(lines, "h")
@@ -39,7 +40,7 @@ def graded(inputs: list[Path]) -> tuple[Figure, str]:
         ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter(lambda value, _: f"1/{1 / value:.0f}")
         grid_lines(ax)
-        said.append(f"{kind.capitalize()}: {'; '.join(parts)}.")
+        message.append(f"{kind.capitalize()}: {'; '.join(parts)}.")
     low, high = axes[0].get_ylim()
     for ax in axes:
         triangle(ax, h[0] / 2.4, h[0] / 1.2, low * 2)
@@ -56,12 +57,12 @@ def graded(inputs: list[Path]) -> tuple[Figure, str]:
         "blocks, the first one 256 times shorter. On these grids the orders are those of smooth data; the first block itself "
         "remains O(k^(3/4)) and would show on much finer ones. Uniform |w| follows no power yet: its fit is not judged."
     )
-    return figure, " ".join([head, *said])
+    return figure, " ".join([head, *message])
 
 
 def verdicts(inputs: list[Path]) -> tuple[Figure, str]:
     """How far every line of the report is from its band: 0 in the middle of the band, 1 at its edge, by origin."""
-    lines = [line | {"topic": path.stem} for path in inputs for line in rows(path)]
+    lines = [line | {"topic": path.stem} for path in inputs for line in tables.texts(path)]
     topics = list(dict.fromkeys(line["topic"] for line in lines))
     figure, ax = plt.subplots(figsize=(7.8, 0.42 * len(topics) + 1.4))
     for y, topic in enumerate(topics):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
 import logging
 import re
@@ -16,6 +15,7 @@ from warmslip.io.trajectory import Trajectory
 from warmslip.io.vtu import BODY, three, write_vtu
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import contact_fields, resultants
+from warmslip.records import tables
 from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
@@ -62,7 +62,7 @@ def export(
     fields: Collection[str] = FIELDS,
     times: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
-    say: Callable[[str], None] = log.warning,
+    warn: Callable[[str], None] = log.warning,
 ) -> int:
     """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
 
@@ -88,11 +88,11 @@ def export(
         d = t.discretisation()
         chosen = range(len(t.time)) if times is None else sorted({state_number(t, time) for time in times})
         if set(fields) != set(FIELDS):  # all that there are
-            fields = _there(t, d, fields, say)
+            fields = _there(t, d, fields, warn)
         for time in times or []:
             taken = float(t.time[state_number(t, time)])
             if abs(taken - time) > 1e-9 * d.scene.time.end:
-                say(f"no state is stored at t = {time:g}; the nearest, at t = {taken:g}, is taken")
+                warn(f"no state is stored at t = {time:g}; the nearest, at t = {taken:g}, is taken")
         folder.mkdir(parents=True, exist_ok=True)
         for earlier in folder.iterdir():
             if OWN.fullmatch(earlier.name):
@@ -118,7 +118,7 @@ def export(
     return len(chosen)
 
 
-def _there(t: Trajectory, d: Discretisation, fields: Collection[str], say: Callable[[str], None]) -> list[str]:
+def _there(t: Trajectory, d: Discretisation, fields: Collection[str], warn: Callable[[str], None]) -> list[str]:
     """The fields that the run has; says which it does not have. Raises ValueError when it has none of them."""
     there = {
         **dict.fromkeys(("displacement", "velocity", "stress", "von Mises"), t.u is not None),
@@ -130,7 +130,7 @@ def _there(t: Trajectory, d: Discretisation, fields: Collection[str], say: Calla
     if missing and len(missing) == len(fields):
         raise ValueError(f"the run has no {', '.join(missing)}; choose from {has}")
     for name in missing:
-        say(f"the run has no {name}, which is left out; it has {has}")
+        warn(f"the run has no {name}, which is left out; it has {has}")
     return [name for name in fields if there[name]]
 
 
@@ -152,14 +152,13 @@ def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
 
 
 def _series(t: Trajectory, d: Discretisation, path: Path) -> None:
-    steps, ledger = t.series("steps"), t.series("ledger")
+    steps, balances = t.series("steps"), t.series("balances")
     friction = steps["friction_traction"]
     columns = {"time": steps["time"]} | {name: steps[name] for name in STEPS}
     columns |= {f"friction_{axis}": friction[:, i] for i, axis in enumerate("xyz"[: friction.shape[1]])}
     if len(d.surface.weights):
         columns |= resultants(d, t.series("contact")["force"])
-    columns |= ledger
-    with path.open("w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(columns)
-        out.writerows([f"{value:.17g}" for value in row] for row in zip(*columns.values(), strict=True))
+    columns |= balances
+    tables.write(
+        path, (dict(zip(columns, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True))
+    )

@@ -9,7 +9,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-from warmslip.io.trajectory_writer import LEDGER, REPORT
+from warmslip.io.trajectory_writer import BALANCES, REPORT
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
 from warmslip.typing import Array
@@ -34,7 +34,7 @@ def _check(file: h5py.File) -> None:
         if points or name in file["contact"]:
             _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))
     _shape(file, "steps/time", "f", None)
-    for group, names in (("steps", REPORT), ("ledger", LEDGER)):
+    for group, names in (("steps", REPORT), ("balances", BALANCES)):
         for name in {*file[group], *names}:
             _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
 
@@ -86,7 +86,7 @@ class Trajectory:
     def _whole(self) -> tuple[int, int]:
         """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
         file = self._file
-        series = [data for group in ("steps", "ledger") for data in file[group].values()]
+        series = [data for group in ("steps", "balances") for data in file[group].values()]
         series += [file[f"contact/{name}"] for name in CONTACT if name in file["contact"]]
         steps = min(len(data) for data in series)
         states = min(len(data) for data in file["states"].values())
@@ -165,7 +165,7 @@ class Trajectory:
 
     def series(self, group: str) -> dict[str, Array]:
         """Every dataset of `steps`, `ledger` or `contact` as arrays."""
-        fixed = () if group in ("steps", "ledger") else ("positions", "normals", "weights", "part")
+        fixed = () if group in ("steps", "balances") else ("positions", "normals", "weights", "part")
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }

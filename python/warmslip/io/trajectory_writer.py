@@ -12,12 +12,12 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-from warmslip._core import Ledger
+from warmslip._core import Balances
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
-LEDGER = tuple(Ledger.terms)
+BALANCES = tuple(Balances.terms)
 # held back before it is written: bytes, seconds
 LARGEST, LONGEST = 2**25, 1.0
 SPARE = 2**19  # bytes that are kept free for closing the file: HDF5 does not survive a full disk
@@ -105,8 +105,8 @@ class TrajectoryWriter:
         for name in REPORT:
             table(f"steps/{name}")
         table("steps/friction_traction", d)
-        for name in LEDGER:
-            table(f"ledger/{name}")
+        for name in BALANCES:
+            table(f"balances/{name}")
         if points:
             table("contact/force", points, d)
             table("contact/displacement", points, d)
@@ -158,7 +158,7 @@ class TrajectoryWriter:
             )  # not the last one of a run that was stopped
             for name in self._file["states"]:
                 self._take(file, f"states/{name}", due)
-            for group in ("steps", "ledger"):
+            for group in ("steps", "balances"):
                 for name in self._file[group]:
                     self._take(file, f"{group}/{name}", np.arange(keep))
             for name in ("force", "displacement", "status", "gap"):
@@ -185,8 +185,8 @@ class TrajectoryWriter:
             for name in REPORT:
                 self._append(f"steps/{name}", getattr(report, name))
             self._append("steps/friction_traction", report.friction_traction)
-            for name in LEDGER:
-                self._append(f"ledger/{name}", getattr(report.ledger, name))
+            for name in BALANCES:
+                self._append(f"balances/{name}", getattr(report.balances, name))
             if len(self._d.surface.weights):
                 shape = (-1, self._d.dim)
                 self._append("contact/force", np.reshape(stepper.contact_force, shape))

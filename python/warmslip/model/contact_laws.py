@@ -54,45 +54,45 @@ class Law:
         """Which functions there are."""
         return [f"laws.{part}.{name}" for name in ("compliance", "friction") if getattr(self, name) is not None]
 
-    def tried(self, part: str, length: float) -> Watched:
+    def validate(self, part: str, length: float) -> CheckedLaw:
         """The functions, tried on penetrations up to a hundredth of `length`, the pressures these give, and slip speeds.
 
         Raises ValueError with the place where a function is not what it should be.
         """
-        watched = Watched.of(part, self, length)
+        watched = CheckedLaw.of(part, self, length)
         pressures = OFF * np.geomspace(1e-6, 1e2, 9)
         if watched.compliance is not None:
             r = OFF * np.geomspace(1e-8, DEEPEST, 61) * length
-            pressures = np.array([watched.compliance.tried(float(one))[0] for one in r])[::8]
+            pressures = np.array([watched.compliance.validate(float(one))[0] for one in r])[::8]
             _derives(watched.compliance, r[:, None], axis=0)
         if watched.friction is not None:
             for p in (0.0, *pressures):
-                watched.friction.tried(float(p), 0.0)
+                watched.friction.validate(float(p), 0.0)
             places = [(p, speed) for p in pressures if p > 0 for speed in OFF * np.geomspace(1e-3, 10, 9)]
             for axis in (0, 1) if places else ():
                 _derives(watched.friction, np.array(places), axis=axis)
         return watched
 
 
-class Watch:
+class CheckedFunction:
     """A function of a law as the core calls it: what it gives is tried each time, and what cannot be becomes `nothing`.
 
     A step whose answer lies there fails, on all ranks alike; an iterate that went too far is led back by the safeguards of the
-    contact solver. `wrong` has the reason for the least place since `forget`.
+    contact solver. `violation` has the reason for the least place since `reset`.
     """
 
     nothing: Triple = (math.nan, math.nan, math.nan)
 
     def __init__(self, name: str, function: Callable[..., Sequence[float]], length: float) -> None:
         self.name, self._function, self._length = name, function, length
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Before a step: what went wrong in iterates of the last one is of no consequence."""
-        self.wrong: str | None = None
+        self.violation: str | None = None
         self._least = math.inf
 
-    def anew(self) -> Watch:
+    def fresh_copy(self) -> CheckedFunction:
         """The same function, of which nothing is known yet."""
         return type(self)(self.name, self._function, self._length)
 
@@ -100,13 +100,13 @@ class Watch:
         if not all(map(math.isfinite, place)):  # the step has failed before
             return self.nothing
         try:
-            return self.tried(*place)
+            return self.validate(*place)
         except ValueError as error:
             if place[0] < self._least:
-                self.wrong, self._least = str(error), place[0]
+                self.violation, self._least = str(error), place[0]
             return self.nothing
 
-    def tried(self, *place: float) -> Triple:
+    def validate(self, *place: float) -> Triple:
         """The three values. Raises ValueError with the place for what is no value of a law."""
         at = ", ".join(f"{x:.3g}" for x in place)
         try:
@@ -120,7 +120,7 @@ class Watch:
         return one, two, three
 
 
-class Pressing(Watch):
+class CheckedCompliance(CheckedFunction):
     """A compliance, which must also agree with itself: between two penetrations the energy grows by the pressure."""
 
     nothing = (math.inf, math.inf, math.inf)  # whatever comes there is pressed back
@@ -135,9 +135,9 @@ class Pressing(Watch):
         """Whether it was asked in vain for penetrations larger than the body alone."""
         return self._length < self._least < math.inf
 
-    def tried(self, *place: float) -> Triple:
+    def validate(self, *place: float) -> Triple:
         (r,) = place
-        pressure, slope, energy = super().tried(r)
+        pressure, slope, energy = super().validate(r)
         if r <= DEEPEST * self._length:
             self._most = max(self._most[0], pressure), max(self._most[1], energy)
         here, at = (r, pressure, energy), bisect.bisect(self._met, (r,))
@@ -174,38 +174,38 @@ class Pressing(Watch):
 
 
 @dataclass(frozen=True)
-class Watched:
+class CheckedLaw:
     """The functions of a law in the hands of one problem."""
 
-    compliance: Pressing | None = None
-    friction: Watch | None = None
+    compliance: CheckedCompliance | None = None
+    friction: CheckedFunction | None = None
 
     @classmethod
-    def of(cls, part: str, law: Law, length: float) -> Watched:
+    def of(cls, part: str, law: Law, length: float) -> CheckedLaw:
         """The functions of the law of a contact part of a body of size `length`, of which nothing is known yet."""
         return cls(
-            law.compliance and Pressing(f"laws.{part}.compliance", law.compliance, length),
-            law.friction and Watch(f"laws.{part}.friction", law.friction, length),
+            law.compliance and CheckedCompliance(f"laws.{part}.compliance", law.compliance, length),
+            law.friction and CheckedFunction(f"laws.{part}.friction", law.friction, length),
         )
 
     @property
-    def functions(self) -> list[Watch]:
+    def functions(self) -> list[CheckedFunction]:
         return [one for one in (self.compliance, self.friction) if one is not None]
 
     @property
-    def wrong(self) -> str | None:
+    def violation(self) -> str | None:
         """Why the step failed, if it was for one of the functions: a penetration beyond the body is only an iterate's."""
         far = self.compliance is not None and self.compliance.too_far
-        return next((one.wrong for one in self.functions if one.wrong and not far), None)
+        return next((one.violation for one in self.functions if one.violation and not far), None)
 
 
-def _derives(law: Watch, places: Array, *, axis: int) -> None:
+def _derives(law: CheckedFunction, places: Array, *, axis: int) -> None:
     """The derivative by an argument is the difference quotient, but at kinks."""
     step = np.zeros_like(places)
     step[:, axis] = 1e-5 * places[:, axis]
 
     def values(at: Array) -> Any:
-        return np.array([law.tried(*map(float, place)) for place in at]).T
+        return np.array([law.validate(*map(float, place)) for place in at]).T
 
     over, under, here = (values(places + sign * step) for sign in (1, -1, 0))
     quotient, stated = (over[0] - under[0]) / (2 * step[:, axis]), here[1 + axis]

@@ -14,11 +14,11 @@ from warmslip._core import largest_strain as largest_principal_strain
 from warmslip._core import stress as cell_stress
 from warmslip._core import stress_out_of_plane as cell_stress_out_of_plane
 from warmslip.messages import quoted
-from warmslip.model.contact_laws import Law, Watched
+from warmslip.model.contact_laws import CheckedLaw, Law
 from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, data, evaluate
 from warmslip.model.materials import contact_part, make_mesh, materials, of_dim
-from warmslip.model.prescribed import Clamped
+from warmslip.model.prescribed import PrescribedContact
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
@@ -39,8 +39,8 @@ class Discretisation:
     surface: Any
     norms: Any
     load_vectors: LoadVectors
-    laws: list[Watched]  # functions in the place of the scene's laws
-    clamped: Clamped  # contact points that supports hold
+    laws: list[CheckedLaw]  # functions in the place of the scene's laws
+    prescribed: PrescribedContact  # contact points that supports hold
     own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
 
     @property
@@ -163,9 +163,9 @@ class Discretisation:
         return self.mises_of(*self.straining(stepper))
 
 
-def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched]:
+def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, CheckedLaw]:
     """The laws, each on a part that touches and tried on samples. Raises ValueError, TypeError for what is no Law."""
-    tried: dict[str, Watched] = {}
+    tried: dict[str, CheckedLaw] = {}
     touching = [contact.part for contact in scene.contacts if contact.stiffness is not None]
     for part, law in laws.items():
         if part not in touching:
@@ -176,7 +176,7 @@ def _checked(laws: dict[str, Law], scene: Scene, mesh: Any) -> dict[str, Watched
             )
         if not isinstance(law, Law):
             raise TypeError(f"laws['{part}'] is {law!r}; give a Law, such as Law(friction=...)")
-        tried[part] = law.tried(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
+        tried[part] = law.validate(part, float(np.ptp(np.asarray(mesh.nodes), axis=0).max()))
         log.warning(
             "laws.%s: evaluated in Python at every contact point and iteration, slower than the scene's own laws", part
         )
@@ -228,8 +228,8 @@ def discretise(
         mesh=mesh,
         materials=given,
         regions=regions,
-        clamped=list(scene.supports.displacement),
-        cooled=list(scene.supports.temperature),
+        prescribed_displacement=list(scene.supports.displacement),
+        prescribed_temperature=list(scene.supports.temperature),
         contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
         lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
     )
@@ -244,8 +244,8 @@ def discretise(
     operators = of_dim("Operators", d)(layout, problem)
     vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
     rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in own)
-    clamped = Clamped(scene, mesh, surface, loads, vectors, rigid)
-    if not clamped.of_time and (why := clamped.inside(0.0)):
+    prescribed = PrescribedContact(scene, mesh, surface, loads, vectors, rigid)
+    if not prescribed.of_time and (why := prescribed.inside(0.0)):
         raise ValueError(f"supports.displacement: {why}")
     return Discretisation(
         scene,
@@ -258,7 +258,7 @@ def discretise(
         of_dim("Norms", d)(layout),
         vectors,
         list(watched.values()),
-        clamped,
+        prescribed,
         own,
     )
 

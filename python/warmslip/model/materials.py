@@ -10,7 +10,7 @@ import numpy as np
 from warmslip._core import ContactLaw, ContactPart, Diagonal, Friction, NormalCompliance
 from warmslip.mesh import files
 from warmslip.mesh.refinement import refined
-from warmslip.model.contact_laws import Watched
+from warmslip.model.contact_laws import CheckedLaw
 from warmslip.scene.expressions import Expression
 from warmslip.scene.mesh_table import MeshTable
 from warmslip.scene.scene import Scene
@@ -92,7 +92,7 @@ def make_mesh(scene: Scene) -> Any:
         return mesh
     nodes = np.array(mesh.nodes)
     for axis, (ratio, length) in enumerate(zip(table.grading, table.sides, strict=True)):
-        if ratio != 1:  # a geometric row of bricks, of which twice as many have all its nodes
+        if ratio != 1:  # a geometric row of cells, of which twice as many have all its nodes
             with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
                 nodes[:, axis] = length * np.expm1(np.log(ratio) * nodes[:, axis] / length) / (ratio - 1)
     return kind.from_lists(nodes, mesh.cells, {name: np.array(facets) for name, facets in mesh.parts.items()})
@@ -148,15 +148,15 @@ def cell_regions(scene: Scene, mesh: Any) -> Any:
     return numbers
 
 
-def contact_part(contact: ContactTable, own: Watched | None = None) -> Any:
+def contact_part(contact: ContactTable, own: CheckedLaw | None = None) -> Any:
     """A contact table as a `_core.ContactPart`, with functions of one's `own` in the place of its laws."""
     law, friction, exchange = None, contact.friction, contact.heat_exchange
-    own = own or Watched()
+    own = own or CheckedLaw()
     if contact.stiffness is not None:
         compliance = NormalCompliance(
             stiffness=contact.compliance,
             exponent=contact.exponent,
-            most=np.inf if contact.pressure_limit is None else contact.pressure_limit,
+            pressure_limit=np.inf if contact.pressure_limit is None else contact.pressure_limit,
             custom=own.compliance,
         )
         bound = Friction(
@@ -175,5 +175,5 @@ def contact_part(contact: ContactTable, own: Watched | None = None) -> Any:
         quadrature=contact.points,
         conductance=exchange.conductance if exchange else 0.0,
         per_pressure=exchange.per_pressure if exchange else 0.0,
-        friction_share=contact.friction_heating.share if contact.friction_heating else 0.0,
+        share=contact.friction_heating.share if contact.friction_heating else 0.0,
     )

@@ -19,7 +19,7 @@ ROUNDING = 1e-12  # relative to displacement and gap: what the law of contact do
 
 
 @dataclass(frozen=True)
-class Clamped:
+class PrescribedContact:
     """Of one problem; `own` names the parts whose compliance is a function of the user's."""
 
     scene: Scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from warmslip.records import tables
 from warmslip.studies import rates
 
 # the legible ticks of figure 5: the curve they label must lie among them and use them
@@ -22,7 +23,7 @@ def _yes(condition: bool) -> str:
 
 def curve(path: Path, term: str) -> tuple[list[float], list[float]]:
     """h and the error of `term` along the diagonal h = k, coarsest first."""
-    rows = sorted((r for r in rates.read(path)[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
+    rows = sorted((r for r in tables.read(path)[:-1] if r["n"] == r["steps"]), key=lambda r: -r["h"])
     return [r["h"] for r in rows], [r[f"e_{term}"] for r in rows]
 
 
@@ -55,7 +56,7 @@ def table(paths: list[Path], coupling: str = "staggered") -> list[dict[str, Any]
             for term in ("u_theta", "u_w_theta"):
                 found = figure_five(by_temperature[temperature], term)
                 line |= {f"{key}_{term}_{temperature:g}": value for key, value in found.items()}
-        ends = {t: rates.read(p)[-1] for t, p in by_temperature.items()}
+        ends = {t: tables.read(p)[-1] for t, p in by_temperature.items()}
         for claim, column in LARGER.items():
             ratio = ends[hot][column] / ends[cold][column]
             line |= {f"{claim}_ratio": ratio, f"{claim}_larger": _yes(ratio > 1)}

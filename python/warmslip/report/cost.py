@@ -46,34 +46,38 @@ def _timed(action: Callable[[], None]) -> float:
     return time.perf_counter() - begin
 
 
-def trial(job: Simulation, folder: Path) -> Trial:
+def trial(simulation: Simulation, folder: Path) -> Trial:
     """Takes the first steps of a run with their output into a folder (collective)."""
     found, begin, few = Trial(), time.perf_counter(), 0.0
-    with TrajectoryWriter(folder / "trajectory.h5", job.discretisation, job.stepper, job.comm) as writer:
+    with TrajectoryWriter(
+        folder / "trajectory.h5", simulation.discretisation, simulation.stepper, simulation.comm
+    ) as writer:
         before = time.perf_counter()
-        for _, report in job.steps():
-            writer.step(report, job.taken)
+        for _, report in simulation.steps():
+            writer.step(report, simulation.taken)
             now = time.perf_counter()
             found.steps.append(now - before)
-            if job.taken in (FEW, 2 * FEW):  # the first time files grow their first blocks
+            if simulation.taken in (FEW, 2 * FEW):  # the first time files grow their first blocks
                 few = _timed(writer.write)
                 found.extra += few
-            if job.comm.bcast(job.taken >= MANY or (job.taken >= FEW and now - begin > LONG_ENOUGH), root=0):
+            if simulation.comm.bcast(
+                simulation.taken >= MANY or (simulation.taken >= FEW and now - begin > LONG_ENOUGH), root=0
+            ):
                 break
             before = time.perf_counter()
-        flush, more = _timed(writer.write), job.taken - 2 * FEW
+        flush, more = _timed(writer.write), simulation.taken - 2 * FEW
         if more > FEW:
             found.storing = max(0.0, (flush - few) / (more - FEW))
-        saving = _timed(lambda: job.take_checkpoint().write(folder))
+        saving = _timed(lambda: simulation.take_checkpoint().write(folder))
         found.checkpoint = flush + saving
         found.extra += saving
     return found
 
 
-def _bent(job: Simulation) -> list[str]:
+def _bent(simulation: Simulation) -> list[str]:
     """Contact parts that are not flat at some nodes, as a sentence."""
-    points = np.asarray(job.discretisation.surface.positions)
-    nodal = all(contact.points == 0 for contact in job.scene.contacts)
+    points = np.asarray(simulation.discretisation.surface.positions)
+    nodal = all(contact.points == 0 for contact in simulation.scene.contacts)
     there = len(np.unique(points, axis=0))
     if not nodal or there == len(points):
         return []
@@ -83,12 +87,14 @@ def _bent(job: Simulation) -> list[str]:
     ]
 
 
-def _solutions(job: Simulation) -> tuple[list[str], list[str]]:
+def _solutions(simulation: Simulation) -> tuple[list[str], list[str]]:
     """How many solutions a step has, as a line, and as a warning where several are possible."""
-    if job.stepper.u is None or not len(job.discretisation.surface.weights):
+    if simulation.stepper.u is None or not len(simulation.discretisation.surface.weights):
         return [], []
-    line = several_solutions.line(several_solutions.of_scene(job.discretisation, job.stepper))
-    return [line] if line else [], several_solutions.sentences(job.discretisation, job.stepper, job.statistics.stages)
+    line = several_solutions.line(several_solutions.of_scene(simulation.discretisation, simulation.stepper))
+    return [line] if line else [], several_solutions.sentences(
+        simulation.discretisation, simulation.stepper, simulation.statistics.stages
+    )
 
 
 def measured(scene: Scene, *, comm: Any = None) -> Plan:
@@ -98,31 +104,31 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     run would.
     """
     begin = time.perf_counter()
-    job = Simulation(scene, comm=comm)
+    simulation = Simulation(scene, comm=comm)
     setup = time.perf_counter() - begin
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
-        tried = trial(job, Path(folder))
-        finish(job, Path(folder))
+        tried = trial(simulation, Path(folder))
+        finish(simulation, Path(folder))
         output = time.perf_counter() - begin - sum(tried.steps) - tried.extra
     output += (scene.time.steps - 1) // scene.output.checkpoint * tried.checkpoint
     taken = len(tried.steps)
     step = tried.step if taken else float("nan")
     found = plan(scene)
-    mesh = job.discretisation.mesh
+    mesh = simulation.discretisation.mesh
     count = np.bincount(cell_regions(scene, mesh), minlength=1 + len(scene.regions))
     regions = [
         f"region '{name}': {n} of {len(mesh.cells)} cells" for name, n in zip(scene.regions, count[1:], strict=True)
     ]
-    size = f"{job.discretisation.unknowns} unknowns, {len(job.discretisation.surface.weights)} contact points"
-    unique, told = job.comm.bcast(_solutions(job) if job.comm.rank == 0 else None, root=0)
+    size = f"{simulation.discretisation.unknowns} unknowns, {len(simulation.discretisation.surface.weights)} contact points"
+    unique, answer = simulation.comm.bcast(_solutions(simulation) if simulation.comm.rank == 0 else None, root=0)
     return replace(
         found,
         every_step=[*found.every_step, *unique],
-        suspicious=[*found.suspicious, *_bent(job)],
-        warnings=[*before(job.discretisation), *told],
+        suspicious=[*found.suspicious, *_bent(simulation)],
+        warnings=[*before(simulation.discretisation), *answer],
         fields=[*found.fields, size, *regions],
-        solver=job.stepper.solver,
+        solver=simulation.stepper.solver,
         setup_seconds=setup,
         step_seconds=step,
         output_seconds=output,
@@ -136,7 +142,7 @@ def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) 
     names, rows = library(), []
     for i, name in enumerate(names, start=1):
         scene = load(name)
-        said: list[float] = []
+        message: list[float] = []
         took: list[float] = []
         for attempt in range(repeats + 1):
             predicted = measured(scene).seconds
@@ -145,12 +151,10 @@ def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) 
                 run(scene, out=folder)
                 found = time.perf_counter() - begin
             if attempt:  # the first one loads libraries
-                said.append(predicted)
+                message.append(predicted)
                 took.append(found)
-        middle, real = float(np.median(said)), float(np.median(took))
-        rows.append(
-            {"scene": name, "steps": scene.time.steps, "said": middle, "took": real, "said_over_took": middle / real}
-        )
+        middle, real = float(np.median(message)), float(np.median(took))
+        rows.append({"scene": name, "steps": scene.time.steps, "said": middle, "took": real, "ratio": middle / real})
         if progress:
             progress(i, len(names))
     return rows

@@ -171,10 +171,12 @@ def _along(nodes: Array, edges: Any, points: Array) -> Array:
 
 
 def _history(t: Trajectory, d: Discretisation) -> dict[str, dict[str, Array]]:
-    steps, ledger = t.series("steps"), t.series("ledger")
+    steps, balances = t.series("steps"), t.series("balances")
 
     def chosen(names: tuple[str, ...], total: bool = False) -> dict[str, Array]:
-        kept = {name.removesuffix("_residual").replace("_", " "): ledger[name] for name in names if ledger[name].any()}
+        kept = {
+            name.removesuffix("_residual").replace("_", " "): balances[name] for name in names if balances[name].any()
+        }
         return {name: np.cumsum(values) for name, values in kept.items()} if total else kept
 
     panels: dict[str, dict[str, Array]] = {}

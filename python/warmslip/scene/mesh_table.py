@@ -14,23 +14,23 @@ PARTS = {"square": ("left", "right", "bottom", "top"), "cube": ("left", "right",
 
 
 class MeshTable(Table):
-    """A structured box, `n` bricks a side (or one number an axis), each cut along `diagonal`; or a gmsh `file`.
+    """A structured box, `n` cells per side (or one number an axis), each cut along `diagonal`; or a gmsh `file`.
 
-    `grading` is the size of bricks at the far end of an axis over that at the near one, one number an axis: bricks grow in
+    `grading` is the size of cells at the far end of an axis over that at the near one, one number an axis: cells grow in
     geometric progression, and the last of n is grading^((n - 1)/n) times the first.
     """
 
     shape: Literal["square", "cube"] | None = None
     """Body of a structured mesh; square unless there is a file. Parts: left, right, bottom, top, and front, back of a cube."""
     n: Count | list[Count] = 32
-    """Bricks a side, or one number an axis."""
+    """Cells per side, or one number an axis."""
     lengths: list[Positive] | None = None
     """Sides, length; 1 along every axis unless given."""
     grading: list[Positive] | None = None
-    """Size of bricks at the far end of an axis over that at the near one, which twice the bricks keep; the last of n bricks is
+    """Size of cells at the far end of an axis over that at the near one, which twice the cells keep; the last of n cells is
     grading^((n - 1)/n) times the first. One number an axis; 1 unless given."""
     diagonal: Literal["right", "left", "crisscross"] = "right"
-    """How a brick is cut: from (0,0) to (1,1), the other way, or both (square only)."""
+    """How a grid cell is cut: from (0,0) to (1,1), the other way, or both (square only)."""
     file: str | None = None
     """A gmsh file with physical names, beside the scene file; takes the place of all other keys here but refine."""
     refine: Annotated[int, Field(ge=0, le=6, strict=True)] = 0
@@ -65,7 +65,7 @@ class MeshTable(Table):
 
     @property
     def level(self) -> int:
-        """1/h: bricks along the first axis, or how often the edges of a file are cut."""
+        """1/h: cells along the first axis, or how often the edges of a file are cut."""
         return 2**self.refine if self.file is not None else self.counts[0]
 
     @property

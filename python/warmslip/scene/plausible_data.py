@@ -15,7 +15,7 @@ from warmslip.scene.validation import contact_keys, coupling_tables
 FRICTION = 2.0
 KELVIN = 250.0, 400.0  # what data look like that count from absolute zero
 LOCKING = 0.45
-# tip displacement of a cantilever, 5 long and 4 bricks high, over that of beam theory: the docs have the whole table
+# tip displacement of a cantilever, 5 long and 4 cells high, over that of beam theory: the docs have the whole table
 CANTILEVER = {2: (0.62, 0.30, 0.084, 0.051), 3: (0.59, 0.29, 0.077, 0.042)}
 RATIOS = (0.45, 0.49, 0.499, 0.4999)
 GROWS = (
@@ -154,6 +154,6 @@ def _locking(scene: Scene) -> Iterator[str]:
                 else "a finer mesh"
             )
             yield (
-                f"{key} has a Poisson's ratio of {ratio:.5g}, at which linear elements lock: a cantilever of 4 bricks in height "
+                f"{key} has a Poisson's ratio of {ratio:.5g}, at which linear elements lock: a cantilever of 4 cells in height "
                 f"has {part:.2g} of its deflection; take {cure}, or a smaller ratio"
             )

@@ -12,7 +12,7 @@ from warmslip.scene.expressions import Value, finite
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=2**31 - 1, strict=True)]  # steps and bricks are counted in 32 bits
+Count = Annotated[int, Field(ge=1, le=2**31 - 1, strict=True)]  # steps and cells are counted in 32 bits
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=2, max_length=3)]
 Values = Annotated[list[Value], Field(min_length=2, max_length=3)]

@@ -80,21 +80,21 @@ class Monitor:
             if self._impacts:
                 self._phase(touching)
         if self._coupled:
-            self._growth(report.ledger, data)
+            self._growth(report.balances, data)
         if n & (n - 1) == 0:
             self._temperatures()
-        energy = report.ledger.elastic
+        energy = report.balances.elastic
         if energy > 4 * seen["energy"] and n - seen["looked"] >= self._scene.time.steps / 4:
             seen["energy"], seen["looked"] = energy, n
             self._strain()
 
-    def _growth(self, ledger: Any, data: Any) -> None:
+    def _growth(self, balances: Any, data: Any) -> None:
         """Looks for a climb of the energy of what a step changes, which is backward Euler's own dissipation.
 
         Without a change of data that energy falls in every step that does not grow, for R = -c M by theorem.
         """
-        heat = max(one.weight for one in self._coupled) * ledger.heat_damping
-        square = ledger.inertia_damping + ledger.elastic_damping + heat
+        heat = max(one.weight for one in self._coupled) * balances.heat_damping
+        square = balances.inertia_damping + balances.elastic_damping + heat
         row = [growth.log(square), *self._changes(data)]
         if not growth.add(self.seen["course"], row) or not heat >= growth.HOT * square:
             return

@@ -44,13 +44,13 @@ class Result:
 
     @property
     def outcome(self) -> str:
-        """`right`, or the name of what stopped the run."""
+        """`completed`, or the name of what stopped the run."""
         return str(self.summary["outcome"])
 
     @property
-    def right(self) -> bool:
-        """Whether the run went to its end and every step closed its books."""
-        return self.outcome == "right"
+    def completed(self) -> bool:
+        """Whether the run went to its end, and the balances of every step close."""
+        return self.outcome == "completed"
 
 
 def run(
@@ -74,8 +74,8 @@ def run(
 
     Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
-    right, contact_not_converged, not_finite, data_not_finite (a load, a gap), held_inside (a support in a rigid foundation),
-    law_failed (a law of one's own), identity_violated, precision_lost, unsupported, solver_failed (`failure` in the summary
+    completed, contact_not_converged, not_finite, data_not_finite (a load, a gap), support_inside_foundation,
+    law_failed (a law of one's own), balance_violated, precision_lost, unsupported, solver_failed (`failure` in the summary
     has the step that was not taken), and interrupted after
     Ctrl-C or SIGTERM, which leave a checkpoint.
     Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
@@ -139,14 +139,14 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
         simulation.comm.rank == 0 and not simulation.discretisation.own and (folder / "final.vtu").exists()
     ):  # else the disk was full
         try:
-            told = json.loads((folder / "summary.json").read_text())
-            stamp = told["stamp"]
+            answer = json.loads((folder / "summary.json").read_text())
+            stamp = answer["stamp"]
             same = (stamp["scene_hash"], stamp["fingerprint"]) == (simulation.scene.digest(), provenance.fingerprint())
-            if told["outcome"] == "right" and same and not told["functions"]:
+            if answer["outcome"] == "completed" and same and not answer["functions"]:
                 with Trajectory(folder / "trajectory.h5") as t:
                     u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
                     if round(float(t.time[-1]) / simulation.scene.step) == simulation.scene.time.steps:
-                        found = Result(told, u, w, theta, folder / "trajectory.h5")
+                        found = Result(answer, u, w, theta, folder / "trajectory.h5")
         except (OSError, ValueError, LookupError, TypeError):
             pass  # then it is run
     return simulation.comm.bcast(found, root=0)  # type: ignore[no-any-return]
@@ -171,9 +171,9 @@ def _clear(folder: Path, *more: str) -> None:
 
 def finish(simulation: Simulation, folder: Path | None) -> Result:
     """Summary and final fields of a run as it stands, into a folder when there is one (collective)."""
-    told = summary(simulation)
+    answer = summary(simulation)
     u, w, theta = (simulation.discretisation.field(getattr(simulation.stepper, name)) for name in ("u", "w", "theta"))
     if folder is not None and simulation.comm.rank == 0:
-        _whole(folder / "summary.json", lambda path: path.write_text(json.dumps(told, indent=2) + "\n"))
+        _whole(folder / "summary.json", lambda path: path.write_text(json.dumps(answer, indent=2) + "\n"))
         _whole(folder / "final.vtu", lambda path: vtu.write_vtu(path, simulation.discretisation, u, w, theta))
-    return Result(told, u, w, theta, folder / "trajectory.h5" if folder is not None else None)
+    return Result(answer, u, w, theta, folder / "trajectory.h5" if folder is not None else None)

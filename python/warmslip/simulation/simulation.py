@@ -63,7 +63,7 @@ class Simulation:
         )
         # fields that have no digits where nothing determines the place of the body
         self._by_place = FIELDS if warmed and scene.heat is not None else tuple(f for f in FIELDS if f != "theta")
-        self.outcome = "right"
+        self.outcome = "completed"
         self.failure: dict[str, Any] | None = None
         self.report: Any = None
         self.monitor = Monitor(scene, self.discretisation, self.stepper, self.comm)
@@ -80,23 +80,23 @@ class Simulation:
 
         Ends before a step that is not right, whose state is not kept: see `outcome` and `failure`. Collective.
         """
-        moving = self.discretisation.clamped.of_time
+        moving = self.discretisation.prescribed.of_time
         for n in range(self.taken + 1, self.scene.time.steps + 1):
             try:
                 loads = self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step)
             except ValueError as error:  # a formula that gives no finite number; on every rank
                 self._stop("data_not_finite", n, str(error))
                 return
-            if moving and (why := self.discretisation.clamped.inside(n * self.scene.step)):
-                self._stop("held_inside", n, why)
+            if moving and (why := self.discretisation.prescribed.inside(n * self.scene.step)):
+                self._stop("support_inside_foundation", n, why)
                 return
             for law in self.discretisation.laws:
                 for function in law.functions:
-                    function.forget()
+                    function.reset()
             report = self.stepper.advance(*loads, measured=n == self.scene.time.steps)
             self.statistics.attempted(report)
-            if report.outcome != Outcome.right:
-                wrong = self._wrong_law()
+            if report.outcome != Outcome.completed:
+                wrong = self._law_violation()
                 known = {name: value for name, value in residuals(report).items() if value == value}  # not computed
                 if errors := estimates(report):
                     known["digits"] = digits(errors)  # type: ignore[assignment]
@@ -115,12 +115,12 @@ class Simulation:
         self.outcome, self.failure = outcome, {"step": step, "reason": reason} | numbers
         log.info("step %d was not taken: %s", step, outcome)
 
-    def _wrong_law(self) -> str | None:
+    def _law_violation(self) -> str | None:
         """What a law of the user's did in the step, on the first rank that says so (collective)."""
         if not self.discretisation.laws:
             return None
-        said = self.comm.allgather(next((law.wrong for law in self.discretisation.laws if law.wrong), None))
-        return next(filter(None, said), None)
+        message = self.comm.allgather(next((law.violation for law in self.discretisation.laws if law.violation), None))
+        return next(filter(None, message), None)
 
     def warnings(self) -> list[str]:
         """What solves the equations and is hardly sensible, so far (collective)."""
@@ -129,7 +129,7 @@ class Simulation:
     def take_checkpoint(self) -> Checkpoint:
         """The state after the last step; the stepper forgets what a resumed one cannot know (collective)."""
         stepper, d = self.stepper, self.discretisation
-        stepper.forget()
+        stepper.clear_cache()
         fields = {name: d.field(getattr(stepper, name)) for name in ("u", "w", "theta", *PARTED)}
         arrays = {name: values for name, values in fields.items() if values is not None}
         arrays |= {"rigid": np.asarray(stepper.rigid)} if "strained" in arrays else {}

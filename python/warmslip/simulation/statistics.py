@@ -14,7 +14,7 @@ FIELDS = ("u", "theta", "stress", "contact_force")  # whose errors are estimated
 
 def residuals(report: Any) -> dict[str, float]:
     """The relative residual of each balance of a step, dimensionless."""
-    return {name: float(getattr(report.ledger, f"{name}_residual")) for name in BALANCES}
+    return {name: float(getattr(report.balances, f"{name}_residual")) for name in BALANCES}
 
 
 def estimates(report: Any) -> dict[str, float]:

@@ -69,20 +69,27 @@ def scene(full: Scene, chosen: dict[str, str]) -> Scene:
     return full.override(**dict.fromkeys(gone))
 
 
-class Floor:
+class MinimalStep:
     """The least code for a step: right-hand sides, one substitution a field. No contact, no balances, constant loads."""
 
-    def __init__(self, job: Simulation) -> None:
-        self._k, self._operators, self._stepper = job.scene.step, job.discretisation.operators, job.stepper
-        force, heat, *_ = job.discretisation.load_vectors.at(self._k, self._k)
-        kept: list[Any] = [v and v.copy() for v in (job.stepper.u, job.stepper.w, job.stepper.theta)]
+    def __init__(self, simulation: Simulation) -> None:
+        self._k, self._operators, self._stepper = (
+            simulation.scene.step,
+            simulation.discretisation.operators,
+            simulation.stepper,
+        )
+        force, heat, *_ = simulation.discretisation.load_vectors.at(self._k, self._k)
+        kept: list[Any] = [
+            v and v.copy() for v in (simulation.stepper.u, simulation.stepper.w, simulation.stepper.theta)
+        ]
         self.u, self.w, self.theta = kept
         self._force, self._heat = (v and v.copy() for v in (force, heat))
         self._right, self._product, self._warm, self._stored = (
             v and v.duplicate() for v in (self.u, self.u, self.theta, self.theta)
         )
         self._clamped, self._cooled = (
-            np.array(held, int) for held in (self._operators.clamped, self._operators.cooled)
+            np.array(held, int)
+            for held in (self._operators.prescribed_displacement, self._operators.prescribed_temperature)
         )
 
     def step(self) -> None:
@@ -111,21 +118,21 @@ class Floor:
             self._stepper.heat_factor.solve(self._warm, self.theta)
 
 
-class March:
+class Member:
     """A run step by step, with the seconds of its contact solver and its balances. RuntimeError when a step is not right."""
 
-    def __init__(self, job: Simulation) -> None:
-        self._job, self._steps = job, job.steps()
+    def __init__(self, simulation: Simulation) -> None:
+        self._job, self._steps = simulation, simulation.steps()
         self.contact: list[float] = []
-        self.books: list[float] = []
+        self.balances: list[float] = []
 
     def step(self) -> None:
         cost = self._job.stepper.cost
-        contact, books = cost.contact_seconds, cost.books_seconds
+        contact, balances = cost.contact_seconds, cost.balance_seconds
         if next(self._steps, None) is None:
             raise RuntimeError(f"the run ended: {self._job.outcome}, {self._job.failure}")
         self.contact.append(cost.contact_seconds - contact)
-        self.books.append(cost.books_seconds - books)
+        self.balances.append(cost.balance_seconds - balances)
 
 
 def timed(action: Callable[[], None]) -> float:
@@ -151,22 +158,22 @@ def ratios(step: Array, whole_model: Array, contact_solver: Array, balances: Arr
     """What the table compares, from seconds of steps that were taken beside each other: medians and quartiles."""
     return (
         spread("over_whole_model", step / whole_model)
-        | spread("over_least", (step - contact_solver - balances) / least)
-        | spread("over_floor", step / (least + contact_solver))
+        | spread("linear_over_minimal", (step - contact_solver - balances) / least)
+        | spread("step_over_minimal", step / (least + contact_solver))
     )
 
 
 def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     """One line of the table; seconds are medians a step, CPU of one process, ratios those of calls after each other.
 
-    `least` is the least code for what is linear, written for the blocks that are there and no others. `over_least` is a step
-    without its contact solver and its balances over it: 1 when what is absent costs nothing. `over_floor` is the whole step,
-    balances included, over the least code and the contact solver. `_lower` and `_upper` are quartiles. `substitutions`,
-    `products` (of a matrix and a vector) and `newton_iterations` are counted, a step each.
+    `least` is the least code for what is linear, written for the blocks that are there and no others.
+    `linear_over_minimal` is a step without its contact solver and its balances over it: 1 when what is absent costs nothing.
+    `step_over_minimal` is the whole step, balances included, over the least code and the contact solver. `_lower` and
+    `_upper` are quartiles. `substitutions`, `products` (of a matrix and a vector) and `newton_iterations` are counted, a step each.
     """
     product = PETSc.Log.Event("MatMult")
-    job, model = Simulation(scene(full, chosen)), Simulation(full)
-    one, whole_model, floor = March(job), March(model), Floor(job)
+    simulation, model = Simulation(scene(full, chosen)), Simulation(full)
+    one, whole_model, floor = Member(simulation), Member(model), MinimalStep(simulation)
     times: dict[str, list[float]] = {"step": [], "least": [], "whole_model": []}
     products = 0
     for n in range(full.time.steps):
@@ -176,14 +183,14 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
         times["least"].append(timed(floor.step))
         if n % TURN == TURN - 1:  # both see the same machine
             times["whole_model"] += [timed(whole_model.step) for _ in range(TURN)]
-    times |= {"contact_solver": one.contact, "balances": one.books}
+    times |= {"contact_solver": one.contact, "balances": one.balances}
     seconds = {name: settled(found) for name, found in times.items()}
-    cost, operators = job.stepper.cost, job.discretisation.operators
+    cost, operators = simulation.stepper.cost, simulation.discretisation.operators
     # an estimate of the digits looks at the stress, and at the heat that an error of the velocity makes
     products -= cost.estimates * ((operators.elasticity is not None) + (operators.heating is not None))
     return (
         chosen
-        | {"bricks": full.mesh.counts[0], "unknowns": job.discretisation.unknowns}
+        | {"cells_per_side": full.mesh.counts[0], "unknowns": simulation.discretisation.unknowns}
         | {
             name: float(np.median(seconds[name]))
             for name in ("step", "whole_model", "contact_solver", "balances", "least")
@@ -200,7 +207,7 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
 
 
 def table(n: int, steps: int, progress: Callable[[int, int], None] | None = None) -> list[dict[str, Any]]:
-    """Every combination on a square of n x n bricks, each beside the whole model in the same run.
+    """Every combination on a square of n x n cells, each beside the whole model in the same run.
 
     Raises ValueError for a number of steps that is no multiple of 5, and on several ranks.
     """

@@ -1,37 +1,22 @@
-"""Orders of convergence from tables of errors: observed, corrected for the self-reference, and entitled."""
+"""Orders of convergence from tables of errors: observed, corrected for the self-reference, and expected."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
+from warmslip.records import tables
+from warmslip.records.tables import Row
 from warmslip.scene.errors import SceneError
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import build
 from warmslip.studies.error_norms import SUMS, TERMS
 
-Row = dict[str, Any]
-
 # an energy-norm error is orthogonal to the finer space: its square adds up, the others' values do
 QUADRATIC = {"u_V"}
-
-
-def read(path: Path) -> list[Row]:
-    """A CSV table with numbers where they are numbers."""
-    with path.open() as file:
-        return [{key: _number(value) for key, value in row.items()} for row in csv.DictReader(file)]
-
-
-def _number(text: str) -> Any:
-    try:
-        return float(text) if any(c in text for c in ".einf") else int(text)
-    except ValueError:
-        return {"True": True, "False": False}.get(text, text)
 
 
 def observed(coarse: float, fine: float, ratio: float = 2.0) -> float:
@@ -92,8 +77,8 @@ def williams_exponent(lam: float, mu: float, angle: float = np.pi / 2) -> float:
     return 1.0
 
 
-def entitled(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tuple[float, float]) -> float:
-    """The order in h = k that the paper's scene is entitled to, by term (verification notes, section 4).
+def expected_order(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tuple[float, float]) -> float:
+    """The order in h = k that the paper's scene is expected to, by term (verification notes, section 4).
 
     |u|_V is held back by the clamped-free corners; |w|_L2 by tractions that act from t = 0 on a body at rest, and
     |theta|_L2 by theta_F = 10 against theta_0 = 0 (each O(k^(3/4)) in the maximum over time) or by a singular K (a jump
@@ -105,8 +90,8 @@ def entitled(term: str, *, hot: bool, singular_conductivity: bool, viscosity: tu
     return single[term] if term in single else min(single[one] for one in SUMS[term])
 
 
-def papers(scene: FullScene) -> bool:
-    """Whether `entitled` speaks of the scene: the paper's square with its supports, loads at rest, whatever the constants."""
+def is_paper_problem(scene: FullScene) -> bool:
+    """Whether `expected` speaks of the scene: the paper's square with its supports, loads at rest, whatever the constants."""
     supports, initial = scene.supports, scene.initial
     return (
         scene.mesh.name == "square"
@@ -122,18 +107,18 @@ def table(path: Path, scene: Row) -> list[Row]:
     """Orders along the diagonal h = k (of a mesh file h ~ k) of one study; `scene` is the resolved scene of its stamp.
 
     A sum of terms has no corrected order, as its terms are corrected in different ways; a scene that is not the paper's has no
-    entitled one here (`warmslip check` states what its corners and its start allow). Raises ValueError for fewer than three
+    expected one here (`warmslip check` states what its corners and its start allow). Raises ValueError for fewer than three
     levels there.
     """
-    rows = read(path)
+    rows = tables.read(path)
     try:
         built: FullScene | None = full_model(build(dict(scene)))
     except SceneError:  # not of the paper's kind
         built = None
     reference = rows[-1]["h"]
     # in a study of a mesh file n counts pieces of an edge, and steps are that many times the scene's: h ~ k in place of h = k
-    pace = rows[-1]["steps"] / rows[-1]["n"]
-    diagonal = sorted((r for r in rows[:-1] if r["steps"] == pace * r["n"]), key=lambda r: -r["h"])
+    steps_per_level = rows[-1]["steps"] / rows[-1]["n"]
+    diagonal = sorted((r for r in rows[:-1] if r["steps"] == steps_per_level * r["n"]), key=lambda r: -r["h"])
     if len(diagonal) < 3:
         raise ValueError(
             f"{path}: an order needs three levels on which h and k shrink together, here are {len(diagonal)}; give "
@@ -142,10 +127,10 @@ def table(path: Path, scene: Row) -> list[Row]:
     out: list[Row] = []
     for term in [*TERMS, *SUMS]:
         limit = float("nan")
-        if built is not None and papers(built):
+        if built is not None and is_paper_problem(built):
             singular = abs(np.linalg.det(np.array(built.heat.conductivity))) < 1e-12
             hot = built.contact.heat_exchange.foundation_temperature != built.initial.temperature
-            limit = entitled(term, hot=hot, singular_conductivity=singular, viscosity=built.viscosity.pair(2))
+            limit = expected_order(term, hot=hot, singular_conductivity=singular, viscosity=built.viscosity.pair(2))
         before: Row | None = None
         for line in diagonal:
             error = line[f"e_{term}"]
@@ -164,7 +149,7 @@ def table(path: Path, scene: Row) -> list[Row]:
                     "error": error,
                     "observed": p,
                     "corrected": q,
-                    "entitled": limit,
+                    "expected": limit,
                 }
             )
             before = line

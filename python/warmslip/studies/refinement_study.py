@@ -6,13 +6,10 @@ the reference is measured and its maximum kept. Members on one mesh share their 
 
 from __future__ import annotations
 
-import csv
-import json
 import math
 import resource
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,21 +47,21 @@ def members(levels: list[int], reference: int, grid: str) -> list[tuple[int, int
     return [(n, m) for n in sizes for m in sizes if (n, m) != (reference, reference)]
 
 
-def row(job: Simulation, errors: dict[str, float] | None) -> dict[str, Any]:
+def row(simulation: Simulation, errors: dict[str, float] | None) -> dict[str, Any]:
     """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
-    s, d = job.stepper, job.discretisation
+    s, d = simulation.stepper, simulation.discretisation
     cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
-    report, moves = job.report, d.problem.moves
+    report, moves = simulation.report, d.problem.moves
     return (
         {
-            "n": job.scene.mesh.level,
-            "steps": job.scene.time.steps,
-            "h": 1 / job.scene.mesh.level,
-            "k": job.scene.step,
+            "n": simulation.scene.mesh.level,
+            "steps": simulation.scene.time.steps,
+            "h": 1 / simulation.scene.mesh.level,
+            "k": simulation.scene.step,
         }
         | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
-        | {"outcome": job.outcome}
-        | {f"identity_{name}": job.statistics.residuals[name] for name in BALANCES}
+        | {"outcome": simulation.outcome}
+        | {f"residual_{name}": simulation.statistics.residuals[name] for name in BALANCES}
         | {
             "norm_u_V": d.norms.v(s.u) if moves else 0.0,
             "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
@@ -79,8 +76,10 @@ def row(job: Simulation, errors: dict[str, float] | None) -> dict[str, Any]:
             "open": report.open if report else 0,
             "stick": report.stick if report else 0,
             "slip": report.slip if report else 0,
-            "newton_largest": job.statistics.newton_max,
-            "safeguarded_steps": sum(count for stage, count in job.statistics.stages.items() if stage != "newton"),
+            "newton_largest": simulation.statistics.newton_max,
+            "safeguarded_steps": sum(
+                count for stage, count in simulation.statistics.stages.items() if stage != "newton"
+            ),
             "unknowns": d.unknowns,
             "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
         }
@@ -94,47 +93,47 @@ def study(
     levels: list[int],
     reference: int,
     grid: str = "diagonal",
-    pace: int | None = None,
+    steps_per_level: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
     """The table of a refinement study, finest last; `progress(step, steps)` follows the reference.
 
-    A level is the number of bricks along the first axis, the other axes keep their ratio to it, and of steps, times `pace`. For a
-    mesh from a file it is 1, 2, 4, ..: into how many pieces an edge is cut. The pace is 1 unless it is given, for a file the
-    scene's steps. h is relative to the first side, or to the file's. Numbers of a field that the scene does not have are 0.
+    A level is the number of cells along the first axis; the other axes keep their ratio to it. For a mesh from a file it is
+    1, 2, 4, ..: into how many pieces an edge is cut. A level has `steps_per_level` times as many steps: 1 unless it is given,
+    for a file the scene's steps. h is relative to the first side, or to the file's. Numbers of an absent field are 0.
 
     Errors are maxima over the common times of |u|_V, |w|_L2, |theta|_L2, |u|_L2 and of the sums of the theorem.
-    Raises RuntimeError naming the member when a run does not end right.
+    Raises RuntimeError naming the member when a run is not completed.
     """
     if scene.mesh.refine:
         raise SceneError("mesh.refine: the levels of a study refine the file themselves; leave it out")
     if any(ratio != 1 for ratio in scene.mesh.grading or []):
-        raise SceneError("mesh.grading: graded bricks are not nested in each other; leave it out for a study")
-    if pace is None:
-        pace = scene.time.steps if scene.mesh.file is not None else 1
-    if pace < 1:
-        raise SceneError(f"--pace {pace} is no number of steps; give 1 or more")
+        raise SceneError("mesh.grading: graded cells are not nested in each other; leave it out for a study")
+    if steps_per_level is None:
+        steps_per_level = scene.time.steps if scene.mesh.file is not None else 1
+    if steps_per_level < 1:
+        raise SceneError(f"--steps-per-level {steps_per_level} is no number of steps; give 1 or more")
     meshes: dict[int, Discretisation] = {}
 
-    def job(n: int, steps: int) -> Simulation:
-        one = scene.override(**_mesh(scene, n), **{"time.steps": pace * steps})
+    def simulation(n: int, steps: int) -> Simulation:
+        one = scene.override(**_mesh(scene, n), **{"time.steps": steps_per_level * steps})
         if n not in meshes:
             meshes[n] = discretise(one)
         return Simulation(one, discretisation=replace(meshes[n], scene=one))
 
-    finest = job(reference, reference)
-    runs = [(job(n, m), Largest()) for n, m in members(levels, reference, grid)]
+    finest = simulation(reference, reference)
+    runs = [(simulation(n, m), Largest()) for n, m in members(levels, reference, grid)]
     compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
     steps = {id(run): run.steps() for run, _ in runs}
     marching = finest.steps()
-    for n in range(1, pace * reference + 1):
+    for n in range(1, steps_per_level * reference + 1):
         _next(marching, finest)
         for run, largest in runs:
-            if n % (pace * reference // run.scene.time.steps) == 0:
+            if n % (steps_per_level * reference // run.scene.time.steps) == 0:
                 _next(steps[id(run)], run)
                 largest.add(compare[run.scene.mesh.level].difference(run.stepper, finest.stepper))
         if progress:
-            progress(n, pace * reference)
+            progress(n, steps_per_level * reference)
     return [*(row(run, largest.values) for run, largest in runs), row(finest, None)]
 
 
@@ -174,13 +173,3 @@ def stamp(scene: Scene | None, **more: Any) -> dict[str, Any]:
         peak_memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         **more,
     )
-
-
-def write(path: Path, table: list[dict[str, Any]], record: dict[str, Any]) -> None:
-    """The table as CSV with 17 digits, and its stamp beside it as .json."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(table[0])
-        out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in line.values()] for line in table)
-    path.with_suffix(".json").write_text(json.dumps(record, indent=2) + "\n")

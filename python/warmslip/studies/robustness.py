@@ -53,13 +53,13 @@ LADDERS: dict[str, tuple[Callable[[Any], Overrides], list[Any]]] = {
 }
 
 
-STAGES = ("none", "newton", "restart", "fixed_point", "enumeration")
+STAGES = ("none", "newton", "restart", "tresca_fixed_point", "enumeration")
 # a right answer is right for another factorization too, up to the condition of the step
 AGREEMENT = 1e-6
 
 
 def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
-    """One run at one value: its outcome, the worst of each identity, and a verdict.
+    """One run at one value: its outcome, the largest residual of each balance, and a verdict.
 
     `right`: the run says so and a second run, whose linear algebra is PETSc's instead of CHOLMOD's, has the same norms to
     1e-6; `stopped`: a named outcome, the last good state kept; `refused`: before it started, with a reason; `WRONG`: the
@@ -73,28 +73,32 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
         "steps": 0,
     }
     try:
-        job = Simulation(scene.override(**make(value)))
-        for _ in job.steps():
+        simulation = Simulation(scene.override(**make(value)))
+        for _ in simulation.steps():
             pass
-        other = Simulation(job.scene, backend="petsc")
+        other = Simulation(simulation.scene, backend="petsc")
         for _ in other.steps():
             pass
     except (SceneError, ValueError) as refusal:
         return line | {"outcome": "refused", "reason": str(refusal).replace("\n", " "), "verdict": "refused"}
     except (RuntimeError, MemoryError) as failure:
         return line | {"outcome": "solver_failed", "reason": str(failure).replace("\n", " "), "verdict": "stopped"}
-    difference = disagreement(job, other)
-    reached = job.failure or job.statistics.residuals  # of the step that was not taken, where there is one
-    line |= {"outcome": job.outcome, "disagreement": difference} | {
+    difference = disagreement(simulation, other)
+    reached = (
+        simulation.failure or simulation.statistics.residuals
+    )  # of the step that was not taken, where there is one
+    line |= {"outcome": simulation.outcome, "disagreement": difference} | {
         key: reached.get(key, float("nan")) for key in BALANCES
     }
-    line |= {f"error_{field}": value for field, value in job.statistics.trusted(job.stepper.extents).items()}
     line |= {
-        "newton_largest": job.statistics.newton_max,
-        "stage": max(job.statistics.stages, key=STAGES.index),
-        "steps": job.stepper.cost.steps,
+        f"error_{field}": value for field, value in simulation.statistics.trusted(simulation.stepper.extents).items()
     }
-    if job.outcome != "right":
+    line |= {
+        "newton_largest": simulation.statistics.newton_max,
+        "stage": max(simulation.statistics.stages, key=STAGES.index),
+        "steps": simulation.stepper.cost.steps,
+    }
+    if simulation.outcome != "completed":
         return line | {"verdict": "stopped"}
     return line | {"verdict": "right" if difference <= AGREEMENT else "WRONG"}
 

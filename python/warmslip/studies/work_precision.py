@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from warmslip.studies import rates
+from warmslip.records import tables
 
 
 def problem_of(case: str) -> str:
@@ -33,7 +33,7 @@ def table(paths: list[Path]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for path in paths:
         coupling, quadrature = method_of(path)
-        *members, reference = rates.read(path)
+        *members, reference = tables.read(path)
         for line in members:
             if line["n"] == reference["n"] or line["steps"] == reference["steps"]:
                 continue  # it shares the reference's error in space or in time, which its own measure therefore lacks

@@ -1,1 +1,1 @@
-"""Verification on a scene of one's own: exact answers, entitled orders, graded grids, uncertainty, hypotheses, theory."""
+"""Verification on a scene of one's own: exact answers, expected orders, graded grids, uncertainty, hypotheses, theory."""

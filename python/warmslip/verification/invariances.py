@@ -15,10 +15,10 @@ import numpy as np
 from warmslip._core import Mesh2, Mesh3, Outcome
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.materials import make_mesh
+from warmslip.records.check import Check, below
 from warmslip.scene.full import FullScene
 from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below
 
 # two orders above what is observed, four below the smallest fault worth finding
 ROUND_OFF = 1e-11
@@ -46,16 +46,16 @@ UNITS = {
 
 def finish(scene: FullScene, mesh: Any = None, discretisation: Discretisation | None = None) -> dict[str, Array]:
     """The final u (nodes, d), w (nodes, d), theta (nodes,). Raises RuntimeError when the run does not end right."""
-    job = Simulation(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
-    for _ in job.steps():
+    simulation = Simulation(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
+    for _ in simulation.steps():
         pass
-    return state(job)
+    return state(simulation)
 
 
-def state(job: Simulation) -> dict[str, Array]:
-    if job.outcome != "right":
-        raise RuntimeError(f"'{job.scene.title}' ended: {job.outcome}")
-    return {name: job.discretisation.field(getattr(job.stepper, name)) for name in ("u", "w", "theta")}
+def state(simulation: Simulation) -> dict[str, Array]:
+    if simulation.outcome != "completed":
+        raise RuntimeError(f"'{simulation.scene.title}' ended: {simulation.outcome}")
+    return {name: simulation.discretisation.field(getattr(simulation.stepper, name)) for name in ("u", "w", "theta")}
 
 
 def apart(one: dict[str, Array], other: dict[str, Array]) -> float:
@@ -160,7 +160,7 @@ def restart_apart(scene: FullScene) -> float:
             d.restart(second, u, w, theta, half * k)
         stepper = first if n <= half else second
         report = stepper.advance(*d.load_vectors.at(n * k))
-        if report.outcome != Outcome.right:
+        if report.outcome != Outcome.completed:
             raise RuntimeError(f"'{scene.title}' ended at step {n}: {report.outcome.name}")
     last = second if half < scene.time.steps else first
     return apart(through, {name: d.field(getattr(last, name)) for name in ("u", "w", "theta")})
@@ -186,21 +186,21 @@ def _lists(d: int, nodes: Array, cells: Any, parts: dict[str, Any]) -> Any:
     return make.from_lists(nodes, cells.astype(np.int32), {k: np.asarray(v, dtype=np.int32) for k, v in parts.items()})
 
 
-def lines(name: str, scene: FullScene) -> list[Line]:
-    """Every invariance of one scene, and the worst residual of each identity of its ledger."""
-    job = Simulation(scene)
-    for _ in job.steps():
+def lines(name: str, scene: FullScene) -> list[Check]:
+    """Every invariance of one scene, and the largest residual of each of its balances."""
+    simulation = Simulation(scene)
+    for _ in simulation.steps():
         pass
-    state(job)
+    state(simulation)
     out = [
         below(
             name,
-            f"the {identity} balance closes at every step",
+            f"the {balance} balance closes at every step",
             "identity",
             worst,
             ROUND_OFF,
         )
-        for identity, worst in job.statistics.residuals.items()
+        for balance, worst in simulation.statistics.residuals.items()
     ]
     checks: dict[str, Callable[[], float]] = {
         **{f"unchanged in other units of {key}": lambda u=u: units_apart(scene, u) for key, u in UNITS.items()},  # type: ignore[misc]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+from warmslip.records import tables
 
 FAULTS = 80  # fewer say nothing
 
@@ -34,11 +35,6 @@ def band(low: str, high: str) -> str:
     return f"at most {number(high)}" if float(low) == 0 else f"{number(low)} to {number(high)}"
 
 
-def read(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def row(*cells: str) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
 
@@ -47,7 +43,8 @@ def audits(paths: Sequence[Path]) -> Iterator[str]:
     """What the theory assumes, a line a statement and a column a data set: whether it holds, and the numbers."""
     names = [path.stem.removeprefix("audit_") for path in paths]
     found = {
-        name: {(r["topic"], r["statement"]): r for r in read(path)} for name, path in zip(names, paths, strict=True)
+        name: {(r["topic"], r["statement"]): r for r in tables.texts(path)}
+        for name, path in zip(names, paths, strict=True)
     }
     yield "\n## audits\n\nWhat the theory assumes, on the paper's data sets with the hot foundation (`warmslip check SCENE`). "
     yield "What each answer means is in "
@@ -70,7 +67,7 @@ def faults(path: Path) -> tuple[list[str], bool]:
     That is: every fault tried, at least 80, 95 per cent of them killed, every survivor explained, and `control`, which is no
     fault, alive.
     """
-    rows = {r["fault"]: r for r in read(path)}
+    rows = {r["fault"]: r for r in tables.texts(path)}
     control = rows.pop("control", None)
     tried = [r for r in rows.values() if r["outcome"] != "untried"]
     killers = Counter(r["by"].split("::")[0].split("[")[0] for r in tried if r["outcome"] == "killed")
@@ -100,11 +97,11 @@ def faults(path: Path) -> tuple[list[str], bool]:
 
 
 def markdown(
-    tables: Sequence[Path], figures: Sequence[Path], audited: Sequence[Path] = (), seeded: Path | None = None
+    paths: Sequence[Path], figures: Sequence[Path], audited: Sequence[Path] = (), seeded: Path | None = None
 ) -> tuple[str, bool]:
-    """The report and whether all lines passed; titles come from the stamps. Raises ValueError for a table without lines."""
-    topics = {path.stem: read(path) for path in tables}
-    titles = {path.stem: json.loads(path.with_suffix(".json").read_text())["title"] for path in tables}
+    """The report and whether all checks passed; titles come from the stamps. Raises ValueError for a table without checks."""
+    topics = {path.stem: tables.texts(path) for path in paths}
+    titles = {path.stem: json.loads(path.with_suffix(".json").read_text())["title"] for path in paths}
     empty = [name for name, rows in topics.items() if not rows]
     if empty:
         raise ValueError(f"no lines in {', '.join(empty)}: a verification that checks nothing proves nothing")

@@ -2,48 +2,37 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+from warmslip.records import tables
+from warmslip.records.check import Check
 from warmslip.scene.full import full_model
 from warmslip.scene.reader import load
 from warmslip.verification import invariances, uncertainty
 from warmslip.verification.assumptions import runs
-from warmslip.verification.check import Line
 from warmslip.verification.exact import cases
 from warmslip.verification.grading import study
 from warmslip.verification.mms import solutions
 from warmslip.verification.theory import error_bound, existence
 
-Topic = Callable[[Path], list[Line]]
+Topic = Callable[[Path], list[Check]]
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 READINGS = ("printed", "mixed", "isotropic", "consistent")
 
 
-def save(path: Path, table: Iterable[dict[str, Any]]) -> None:
-    """A table as CSV with 17 digits."""
-    rows = list(table)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(rows[0])
-        out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in row.values()] for row in rows)
-
-
-def exact_answers(folder: Path) -> list[Line]:
+def exact_answers(folder: Path) -> list[Check]:
     """Bodies whose answer can be written down."""
     return list(cases.lines())
 
 
-def manufactured(folder: Path) -> list[Line]:
+def manufactured(folder: Path) -> list[Check]:
     """Fields chosen first, data derived from them: slip, stick, moving kinks, affine fields; the plane and space."""
     return solutions.report(full=True)
 
 
-def unchanged(folder: Path) -> list[Line]:
+def invariance(folder: Path) -> list[Check]:
     """Identities of every step, and changes that must not change the answer, on the paper's data sets and a block."""
     out = []
     for reading in READINGS:
@@ -56,30 +45,32 @@ def unchanged(folder: Path) -> list[Line]:
     return out + invariances.lines("block in space", block)
 
 
-def audited(folder: Path) -> list[Line]:
+def assumptions(folder: Path) -> list[Check]:
     """What the audit of the paper's data sets claims, put to runs; no order of |w|_L2, as none can be seen on these grids."""
     return [line for reading in READINGS for line in runs.lines(reading)]
 
 
-def true_orders(folder: Path) -> list[Line]:
+def convergence(folder: Path) -> list[Check]:
     """Figure 5, done right: the paper's problem on graded and on uniform grids, the reference's own error taken off."""
     scene = full_model(load("paper_mixed")).override(**HOT)
     studies = {
         "graded": study.unbiased(study.study(scene, study.grids(scene), [32, 64, 128, 256], 512), 512),
         "uniform": study.unbiased(study.study(scene, study.UNIFORM, [16, 32, 64, 128], 256), 256),
     }
-    save(folder / "graded_table.csv", [{"grids": name, **row} for name, rows in studies.items() for row in rows])
+    tables.write(
+        folder / "graded_table.csv", [{"grids": name, **row} for name, rows in studies.items() for row in rows]
+    )
     return study.lines("paper_mixed, theta_F = 10", scene, studies["graded"], studies["uniform"])
 
 
-def value_and_uncertainty(folder: Path) -> list[Line]:
+def value_and_uncertainty(folder: Path) -> list[Check]:
     """Numbers without an exact value, from the studies of the paper: value +- uncertainty, put to the test."""
     studies = sorted(Path("results/paper/studies").glob("*_staggered.csv"))
-    save(folder / "uncertainty_table.csv", [row for path in studies for row in uncertainty.table(path)])
+    tables.write(folder / "uncertainty_table.csv", [row for path in studies for row in uncertainty.table(path)])
     return [line for path in studies for line in uncertainty.lines(path)]
 
 
-def theory(folder: Path) -> list[Line]:
+def theory(folder: Path) -> list[Check]:
     """The existence proof run as an algorithm, and the error bound of the theorem term by term."""
     return [*existence.lines(), *error_bound.lines()]
 
@@ -87,9 +78,9 @@ def theory(folder: Path) -> list[Line]:
 TOPICS: dict[str, Topic] = {
     "exact_answers": exact_answers,
     "manufactured": manufactured,
-    "unchanged": unchanged,
+    "invariance": invariance,
     "theory": theory,
-    "audited": audited,
+    "assumptions": assumptions,
     "uncertainty": value_and_uncertainty,
-    "true_orders": true_orders,
+    "convergence": convergence,
 }

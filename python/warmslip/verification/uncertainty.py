@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from warmslip.studies import rates
-from warmslip.verification.check import Line
+from warmslip.records import tables
+from warmslip.records.check import Check
 
 Array = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ FUNCTIONALS = ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "mises_L2"
 
 def table(study: Path) -> list[dict[str, Any]]:
     """Value +- uncertainty at the final time of every functional along h = k of a study, its reference included."""
-    rows = sorted((r for r in rates.read(study) if r["n"] == r["steps"]), key=lambda r: r["n"])
+    rows = sorted((r for r in tables.read(study) if r["n"] == r["steps"]), key=lambda r: r["n"])
     out = []
     for name in FUNCTIONALS:
         found = extrapolate([r["h"] for r in rows], [r[name] for r in rows])
@@ -124,13 +124,13 @@ def table(study: Path) -> list[dict[str, Any]]:
     return out
 
 
-def lines(study: Path) -> list[Line]:
+def lines(study: Path) -> list[Check]:
     """The uncertainty put to the test: the interval from all grids but the finest must hold the value on the finest."""
-    rows = sorted((r for r in rates.read(study) if r["n"] == r["steps"]), key=lambda r: r["n"])
+    rows = sorted((r for r in tables.read(study) if r["n"] == r["steps"]), key=lambda r: r["n"])
     out = []
     for name in FUNCTIONALS:
         found = extrapolate([r["h"] for r in rows[:-1]], [r[name] for r in rows[:-1]])
         low, high = found.value - found.uncertainty, found.value + found.uncertainty
         what = f"the interval of h = 1/{rows[-2]['n']} holds the value of h = 1/{rows[-1]['n']}"
-        out.append(Line(f"{study.stem} {name}", what, "comparison", found.value, rows[-1][name], low, high))
+        out.append(Check(f"{study.stem} {name}", what, "comparison", found.value, rows[-1][name], low, high))
     return out

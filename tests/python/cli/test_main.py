@@ -43,16 +43,16 @@ SMALL = ("--set", "mesh.n=4", "--set", "time.steps=2")
 )
 def test_refusals(command: Command, tmp_path: Path, arguments: list[str], lines: list[str]) -> None:
     result = command("run", *arguments, "--out", "run")
-    said = result.stderr.strip().splitlines()
+    message = result.stderr.strip().splitlines()
     assert result.returncode == 2, result.stderr
     assert "Traceback" not in result.stderr + result.stdout
-    assert len(said) == len(lines)
-    assert all(line.startswith("error: ") and words in line for line, words in zip(said, lines, strict=True))
+    assert len(message) == len(lines)
+    assert all(line.startswith("error: ") and words in line for line, words in zip(message, lines, strict=True))
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["run", "paper_mixed", "mesh.n=16"], "a key of the scene needs --set; write --set mesh.n=16"),
         (["run", "paper_mixed", "mesh.n=4", "time.steps=2"], "write --set mesh.n=4 --set time.steps=2"),
@@ -72,12 +72,12 @@ def test_refusals(command: Command, tmp_path: Path, arguments: list[str], lines:
     ],
 )
 def test_a_call_of_the_wrong_form_is_one_sentence(
-    command: Command, tmp_path: Path, arguments: list[str], said: str
+    command: Command, tmp_path: Path, arguments: list[str], message: str
 ) -> None:
     result = command(*arguments)
     (line,) = result.stderr.splitlines()
     assert (result.returncode, result.stdout) == (2, "")
-    assert line.startswith("error: ") and said in line
+    assert line.startswith("error: ") and message in line
     assert list(tmp_path.iterdir()) == []
 
 
@@ -98,9 +98,9 @@ def test_output_folder_that_is_a_file(command: Command, tmp_path: Path) -> None:
 def test_run_leaves_summary_and_trajectory(command: Command, tmp_path: Path) -> None:
     result = command("run", "paper_mixed", *SMALL, "--set", "contact.friction.coefficient=0.1", "--out", "run")
     assert result.returncode == 0, result.stderr
-    assert result.stdout.startswith("right: 2 steps")
+    assert result.stdout.startswith("completed: 2 steps")
     summary = json.loads((tmp_path / "run/summary.json").read_text())
-    assert summary["outcome"] == "right"
+    assert summary["outcome"] == "completed"
     assert summary["stamp"]["scene"]["contact"]["friction"]["coefficient"] == 0.1
     assert (tmp_path / "run/trajectory.h5").stat().st_size > 0
 
@@ -144,23 +144,23 @@ def test_tables_of_another_kind_are_refused(command: Command, tmp_path: Path, ar
 
 
 def test_a_study_of_ones_own(command: Command, tmp_path: Path) -> None:
-    """Its steps keep pace with the scene, its errors can be drawn, and what is no study is named."""
-    call = "study elastic_drop --levels 2,4 --reference 8 --pace 5 --out own.csv"
+    """Its steps keep steps_per_level with the scene, its errors can be drawn, and what is no study is named."""
+    call = "study elastic_drop --levels 2,4 --reference 8 --steps-per-level 5 --out own.csv"
     done = command(*call.split())
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "own.csv").open()))
     assert [(row["n"], row["steps"]) for row in rows] == [("2", "10"), ("4", "20"), ("8", "40")]
     drawn = command("draw", "study", "own.csv", "--out", "own.png")
     assert drawn.returncode == 0, drawn.stderr
-    said = (tmp_path / "own.rst").read_text()
+    message = (tmp_path / "own.rst").read_text()
     first, last = (float(rows[i]["e_u_V"]) for i in (0, 1))
-    assert f"u_V {first:.3g} to {last:.3g}" in " ".join(said.split()) and "theta" not in said
+    assert f"u_V {first:.3g} to {last:.3g}" in " ".join(message.split()) and "theta" not in message
     refused = command("draw", "errors", "own.csv", "--out", "own.png")
     assert refused.returncode == 2 and "`warmslip draw study` draws any study" in refused.stderr
     nothing = command("rates", "nope.csv", "--out", "rates.csv")
     assert nothing.returncode == 2 and "'nope.csv' is no table of `warmslip study`" in nothing.stderr
-    slow = command(*call.replace("--pace 5", "--pace 0").split())
-    assert slow.returncode == 2 and "--pace 0 is no number of steps" in slow.stderr
+    slow = command(*call.replace("--steps-per-level 5", "--steps-per-level 0").split())
+    assert slow.returncode == 2 and "--steps-per-level 0 is no number of steps" in slow.stderr
 
 
 def test_what_is_odd_is_said_before_a_run(command: Command) -> None:

@@ -123,22 +123,26 @@ def test_a_series_holds_nothing_of_an_earlier_one(tmp_path: Path) -> None:
 
 def test_what_the_run_does_not_have_is_said(tmp_path: Path) -> None:
     warmslip.run(warmslip.load("quasistatic_punch", ["mesh.n=4", "time.steps=4"]), out=tmp_path / "run")
-    said: list[str] = []
-    export(tmp_path / "run", tmp_path / "series", say=said.append)
-    export(tmp_path / "run", tmp_path / "series", fields=["gap"], times=[0.5], say=said.append)
-    assert said == []
+    message: list[str] = []
+    export(tmp_path / "run", tmp_path / "series", warn=message.append)
+    export(tmp_path / "run", tmp_path / "series", fields=["gap"], times=[0.5], warn=message.append)
+    assert message == []
     chosen = ["temperature", "displacement", "pressure"]
-    assert export(tmp_path / "run", tmp_path / "series", fields=chosen, times=[0.5, 0.6], say=said.append) == 1
-    assert said[0].startswith("the run has no temperature, which is left out; it has displacement, velocity, stress, ")
-    assert said[1:] == ["no state is stored at t = 0.6; the nearest, at t = 0.5, is taken"]
+    assert export(tmp_path / "run", tmp_path / "series", fields=chosen, times=[0.5, 0.6], warn=message.append) == 1
+    assert message[0].startswith(
+        "the run has no temperature, which is left out; it has displacement, velocity, stress, "
+    )
+    assert message[1:] == ["no state is stored at t = 0.6; the nearest, at t = 0.5, is taken"]
     with pytest.raises(ValueError, match="the run has no temperature; choose from displacement"):
         export(tmp_path / "run", tmp_path / "series", fields=["temperature"])
 
 
 def test_the_command_says_what_it_took(command: Command, tmp_path: Path) -> None:
     command("run", "quasistatic_punch", "--set", "mesh.n=4", "--set", "time.steps=4", "--out", "run")
-    told = command("export", "run", "--out", "series", "--fields", "temperature,pressure", "--times", "0.3")
-    assert told.returncode == 0 and told.stdout.startswith("1 states in series/contact.pvd, time series in series.csv")
-    notes = told.stderr.splitlines()
+    output = command("export", "run", "--out", "series", "--fields", "temperature,pressure", "--times", "0.3")
+    assert output.returncode == 0 and output.stdout.startswith(
+        "1 states in series/contact.pvd, time series in series.csv"
+    )
+    notes = output.stderr.splitlines()
     assert len(notes) == 2 and all(note.startswith("note: ") for note in notes)
     assert "no temperature" in notes[0] and "at t = 0.25, is taken" in notes[1]

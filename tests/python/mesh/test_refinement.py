@@ -65,7 +65,7 @@ def test_no_worse_shapes() -> None:
 def test_a_scene_asks_for_it(name: str) -> None:
     scene = warmslip.load(name, ["mesh.refine=1", "time.steps=2"])
     found = warmslip.run(scene)
-    assert found.right and len(make_mesh(scene).nodes) == len(found.theta)
+    assert found.completed and len(make_mesh(scene).nodes) == len(found.theta)
     coarse = warmslip.run(warmslip.load(name, ["time.steps=2"]))
     one, other = found.summary["norms"]["theta_L2"], coarse.summary["norms"]["theta_L2"]
     assert 0 < abs(one - other) < 0.05 * other

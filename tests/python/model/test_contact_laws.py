@@ -35,25 +35,25 @@ def test_the_scenes_own_law_written_in_python_gives_the_same(
     small: Small, quadrature: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     scene = small(contact__stiffness=STIFF, contact__friction__coefficient=MU, contact__quadrature=quadrature)
-    told = warmslip.run(scene)
+    output = warmslip.run(scene)
     assert not caplog.records
     own = warmslip.run(scene, laws={"bottom": Law(compliance=linear, friction=coulomb)})
-    assert own.right and np.abs(own.u - told.u).max() < 1e-13 and np.abs(told.u).max() > 1e-3
+    assert own.completed and np.abs(own.u - output.u).max() < 1e-13 and np.abs(output.u).max() > 1e-3
     assert (
         own.summary["functions"] == ["laws.bottom.compliance", "laws.bottom.friction"]
-        and told.summary["functions"] == []
+        and output.summary["functions"] == []
     )
     assert "slower" in caplog.text
     weaker = warmslip.run(scene, laws={"bottom": Law(friction=lambda p, s: (0.9 * MU * p, 0.9 * MU, 0.0))})
-    assert np.abs(weaker.u - told.u).max() > 1e-6
+    assert np.abs(weaker.u - output.u).max() > 1e-6
 
 
 def test_an_exponential_law_closes_its_books(small: Small) -> None:
-    job = warmslip.Simulation(small(), laws={"bottom": Law(compliance=exponential)})
-    for state, _ in job.steps():
+    simulation = warmslip.Simulation(small(), laws={"bottom": Law(compliance=exponential)})
+    for state, _ in simulation.steps():
         p, r = state.contact["pressure"], np.maximum(-state.contact["gap"], 0)
         assert np.abs(p - np.expm1(20 * r)).max() < 1e-11
-    assert job.outcome == "right" and p.max() > 1e-3
+    assert simulation.outcome == "completed" and p.max() > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -132,11 +132,11 @@ def test_a_law_may_end_beyond_what_is_reached(small: Small) -> None:
     def ends(r: float) -> Sequence[float]:
         return linear(r) if r < 1.01 * reached else [math.exp(1e3)]
 
-    job = warmslip.Simulation(scene, laws={"bottom": Law(compliance=linear)})
-    reached = max(report.max_penetration for _, report in job.steps())
-    assert job.outcome == "right" and reached > 0
+    simulation = warmslip.Simulation(scene, laws={"bottom": Law(compliance=linear)})
+    reached = max(report.max_penetration for _, report in simulation.steps())
+    assert simulation.outcome == "completed" and reached > 0
     result = warmslip.run(scene, laws={"bottom": Law(compliance=ends)})
-    assert result.right and np.array_equal(result.u, job.discretisation.field(job.stepper.u))
+    assert result.completed and np.array_equal(result.u, simulation.discretisation.field(simulation.stepper.u))
 
 
 def test_what_is_no_law_is_refused(small: Small) -> None:
@@ -149,7 +149,7 @@ def test_what_is_no_law_is_refused(small: Small) -> None:
 
 
 def test_a_kink_is_no_wrong_derivative() -> None:
-    Law(compliance=lambda r: (min(r, 1e-4), float(r < 1e-4), r**2 / 2 if r < 1e-4 else 1e-4 * r - 5e-9)).tried(
+    Law(compliance=lambda r: (min(r, 1e-4), float(r < 1e-4), r**2 / 2 if r < 1e-4 else 1e-4 * r - 5e-9)).validate(
         "side", 1.0
     )
 
@@ -160,8 +160,8 @@ def test_a_law_is_that_of_its_part_alone() -> None:
     held = {"supports.displacement": ["top"], "supports.temperature": ["top"], "loads.body": [-3.0, -1.0]}
     parts = [one | {"stiffness": 100.0}, one | {"part": "left", "stiffness": STIFF}]
     scene = scene.override(contact=parts, **held)
-    told, own = warmslip.run(scene), warmslip.run(scene, laws={"left": Law(compliance=linear)})
-    assert np.abs(own.u - told.u).max() < 1e-13 and np.abs(told.u).max() > 1e-2
+    output, own = warmslip.run(scene), warmslip.run(scene, laws={"left": Law(compliance=linear)})
+    assert np.abs(own.u - output.u).max() < 1e-13 and np.abs(output.u).max() > 1e-2
 
 
 def test_kinks_on_round_numbers_and_energies_by_quadrature_are_laws(small: Small) -> None:
@@ -175,19 +175,19 @@ def test_kinks_on_round_numbers_and_energies_by_quadrature_are_laws(small: Small
         ),
         Law(compliance=lambda r: (*linear(r)[:2], linear(r)[2] * (1 + 4e-8 * math.sin(1e4 * r)))),
     ):
-        assert warmslip.run(small(contact__stiffness=STIFF), laws={"bottom": law}).right
+        assert warmslip.run(small(contact__stiffness=STIFF), laws={"bottom": law}).completed
 
 
 def test_a_law_asked_far_away_still_knows_what_falls() -> None:
     """One huge value does not blind the watch, and what went wrong before a step is forgotten."""
     law = Law(compliance=lambda r: (math.exp(400 * r) - 1 if r < 0.013 or r > 0.1 else 44.0, 1.0, 1.0))
-    watch = contact_laws.Watched.of("bottom", law, 1.0).compliance
+    watch = contact_laws.CheckedLaw.of("bottom", law, 1.0).compliance
     assert watch is not None
     for r in (0.12, 0.0125, 0.0135):
         watch(r)
-    assert watch.wrong is not None
-    watch.forget()
-    assert watch.wrong is None
+    assert watch.violation is not None
+    watch.reset()
+    assert watch.violation is None
 
 
 def test_an_overshooting_iterate_is_led_back(small: Small) -> None:
@@ -195,7 +195,7 @@ def test_an_overshooting_iterate_is_led_back(small: Small) -> None:
     stiff = Law(compliance=lambda r: (math.expm1(200 * r), 200 * math.exp(200 * r), math.expm1(200 * r) / 200 - r))
     pushed = {"loads__body": [0.0, -20.0], "time__steps": 2, "time__end": 10.0}
     result = warmslip.run(small(**pushed), laws={"bottom": stiff})
-    assert result.right and 1e-3 < result.summary["contact"]["max_penetration"] < 0.1
+    assert result.completed and 1e-3 < result.summary["contact"]["max_penetration"] < 0.1
 
 
 def test_how_exact_a_law_has_to_be() -> None:
@@ -203,21 +203,21 @@ def test_how_exact_a_law_has_to_be() -> None:
 
     def near(error: float) -> str | None:
         law = Law(compliance=lambda r: (*linear(r)[:2], linear(r)[2] * (1 + error * (r > 0.01))))
-        watch = contact_laws.Watched.of("bottom", law, 1.0).compliance
+        watch = contact_laws.CheckedLaw.of("bottom", law, 1.0).compliance
         assert watch is not None
         for r in (0.01, 0.01000001):
             watch(r)
-        return watch.wrong
+        return watch.violation
 
     assert near(1e-7) is None and "is the integral of" in str(near(1e-5))
 
     def sloped(error: float, above: float, faster: float = 0.0) -> Law:
         return Law(friction=lambda p, s: (MU * p, MU * (1 + error * (p > above and s >= faster)), 0.0))
 
-    sloped(5e-4, 0.0).tried("bottom", 1.0)
-    sloped(0.5, 50.0, faster=0.5).tried("bottom", 1.0)  # at one pressure of nine, three speeds of nine
+    sloped(5e-4, 0.0).validate("bottom", 1.0)
+    sloped(0.5, 50.0, faster=0.5).validate("bottom", 1.0)  # at one pressure of nine, three speeds of nine
     for law in (sloped(5e-3, 0.0), sloped(0.5, 50.0)):
         with pytest.raises(ValueError, match="correct the second value"):
-            law.tried("bottom", 1.0)
+            law.validate("bottom", 1.0)
     with pytest.raises(ValueError, match="three finite numbers"):
-        Law(friction=lambda p, s: (MU * p, MU, 0.0) if s > 0 else (math.nan, 0.0, 0.0)).tried("bottom", 1.0)
+        Law(friction=lambda p, s: (MU * p, MU, 0.0) if s > 0 else (math.nan, 0.0, 0.0)).validate("bottom", 1.0)

@@ -53,14 +53,16 @@ def test_operators_equal_scipy(small: MakeScene, reading: str) -> None:
     assert relative(scipy_of(own.inertia.convert("aij", PETSc.Mat())), vector_mass) <= 1e-13
     # the operators of a step: supports are rows and columns of the identity
     free = np.ones(2 * (n + 1) ** 2)
-    free[own.clamped] = 0
+    free[own.prescribed_displacement] = 0
     momentum = sp.diags(free) @ (vector_mass / k + theirs["B"] + k * theirs["A"]) @ sp.diags(free) + sp.diags(1 - free)
     assert relative(scipy_of(_core.momentum_matrix(d.layout, d.problem, own, k)), momentum) <= 1e-13
     free = np.ones((n + 1) ** 2)
-    free[own.cooled] = 0
+    free[own.prescribed_temperature] = 0
     heat = sp.diags(free) @ (theirs["M"] / k + theirs["D"] + theirs["J"]) @ sp.diags(free) + sp.diags(1 - free)
     assert relative(scipy_of(_core.heat_matrix(own, k)), heat) <= 1e-13
-    assert sorted(own.cooled) == [i for i in range((n + 1) ** 2) if i % (n + 1) in (0, n) or i // (n + 1) == n]
+    assert sorted(own.prescribed_temperature) == [
+        i for i in range((n + 1) ** 2) if i % (n + 1) in (0, n) or i // (n + 1) == n
+    ]
 
 
 def test_petsc4py_owns_the_operators(small: MakeScene) -> None:
@@ -156,7 +158,9 @@ def test_contact_surface(small: MakeScene) -> None:
     assert (np.asarray(surface.positions)[:, 1] == 0).all()
     gauss = discretise(small(contact__quadrature="gauss-3")).surface
     assert (len(gauss.weights), gauss.nodes, np.sum(gauss.weights)) == (12, 5, pytest.approx(1, rel=1e-14))
-    with pytest.raises(ValueError, match=r"contact\.part"):  # one brick: every bottom node is clamped by left and right
+    with pytest.raises(
+        ValueError, match=r"contact\.part"
+    ):  # one grid cell: every bottom node is clamped by left and right
         discretise(small(mesh__n=1, supports__displacement=["left", "right"], loads__traction={}))
 
 
@@ -169,10 +173,10 @@ def test_meshes_of_scenes(small: MakeScene) -> None:
 
 @pytest.mark.parametrize(("n", "ratio"), [(3, 8.0), (4, 0.25)])
 def test_graded_bricks_grow_as_the_key_says(small: MakeScene, n: int, ratio: float) -> None:
-    """A geometric progression, added up: its last brick is ratio^((n-1)/n) times the first; twice as many keep its nodes."""
+    """A geometric progression, added up: its last cell is ratio^((n-1)/n) times the first; twice as many keep its nodes."""
 
-    def places(bricks: int) -> Any:
-        mesh = make_mesh(small(mesh__n=[bricks, 1], mesh__lengths=[2.0, 1.0], mesh__grading=[ratio, 1.0]))
+    def places(cells: int) -> Any:
+        mesh = make_mesh(small(mesh__n=[cells, 1], mesh__lengths=[2.0, 1.0], mesh__grading=[ratio, 1.0]))
         return np.unique(np.asarray(mesh.nodes)[:, 0].round(13))
 
     row = ratio ** (np.arange(n) / n)

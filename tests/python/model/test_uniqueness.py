@@ -51,8 +51,8 @@ def scaled(points: ContactPoints, factor: float) -> ContactPoints:
 
 def of_scene(name: str, **keys: Any) -> ContactPoints:
     """The contact points of a scene of the library, with a friction of 1."""
-    job = Simulation(load(name).override(**{key.replace("__", "."): value for key, value in keys.items()}))
-    points = several_solutions.condensed(job.discretisation, job.stepper)
+    simulation = Simulation(load(name).override(**{key.replace("__", "."): value for key, value in keys.items()}))
+    points = several_solutions.condensed(simulation.discretisation, simulation.stepper)
     return replace(points, friction=np.ones(len(points.weights)))
 
 
@@ -266,7 +266,7 @@ def step_from(scene: Scene, starts: list[Array], force: Array | None, penetratio
             d.layout.distribute(force.ravel(), vector)
             loads[0], loads[2] = vector, -penetration
         report = stepper.advance(*loads)
-        assert report.outcome.name == "right", report.reason
+        assert report.outcome.name == "completed", report.reason
         out.append(np.reshape(stepper.contact_force, (-1, d.dim)))
     return out
 
@@ -276,11 +276,11 @@ def test_the_core_finds_the_one_solution_from_any_forces(d: int) -> None:
     scene = load("quasistatic_punch" if d == 2 else "block_3d").override(
         **{"mesh.n": 4, "time.steps": 4, "contact.stiffness": "rigid"}
     )
-    job = Simulation(scene)
-    factor = several_solutions.of_scene(job.discretisation, job.stepper).factor
+    simulation = Simulation(scene)
+    factor = several_solutions.of_scene(simulation.discretisation, simulation.stepper).factor
     assert factor > 1
     scene = scene.override(**{"contact.friction.coefficient": 0.98 * factor * scene.contacts[0].friction.coefficient})
-    rng, n = np.random.default_rng(d), len(job.discretisation.surface.weights)
+    rng, n = np.random.default_rng(d), len(simulation.discretisation.surface.weights)
     starts = [10 ** rng.uniform(-3, 2) * rng.normal(size=(n, d)) for _ in range(12)]
     forces = step_from(scene, starts, None, None)
     largest = np.abs(forces[0]).max()
@@ -294,8 +294,8 @@ PUNCH: dict[str, Any] = {"mesh.n": 4, "supports.displacement": ["top"], "contact
 def test_the_core_finds_two_solutions_beyond_it() -> None:
     """A load on the contact nodes of a small body that is made to have several solutions: the core finds those it starts near."""
     scene = load("quasistatic_punch").override(**PUNCH)
-    job = Simulation(scene)
-    rough = scaled(several_solutions.condensed(job.discretisation, job.stepper), 1 / 0.3)
+    simulation = Simulation(scene)
+    rough = scaled(several_solutions.condensed(simulation.discretisation, simulation.stepper), 1 / 0.3)
     factor = 1.2 * exact(rough)
     rough, scene = scaled(rough, factor), scene.override(**{"contact.friction.coefficient": factor})
     asked = turned_piece(rough)
@@ -328,15 +328,15 @@ def test_the_points_of_a_step_are_those_the_core_had() -> None:
         }
     )
     for scene in (drop, load("quasistatic_punch").override(**{"mesh.n": 5, "time.steps": 8})):
-        job, touched = Simulation(scene), 0
-        for _, report in job.steps():
+        simulation, touched = Simulation(scene), 0
+        for _, report in simulation.steps():
             touched += report.stick + report.slip
-            points, free, penetration = several_solutions.posed(job.discretisation, job.stepper)
+            points, free, penetration = several_solutions.posed(simulation.discretisation, simulation.stepper)
             (one,) = solutions(points, free, penetration)
-            force = np.reshape(job.stepper.contact_force, (-1, 2))
+            force = np.reshape(simulation.stepper.contact_force, (-1, 2))
             assert np.abs(one.force - force).max() <= 1e-8 * np.abs(force).max()
             if np.abs(force).max() > 1e-6:
-                assert [status > 0 for status in one.status] == [status > 0 for status in job.stepper.status]
+                assert [status > 0 for status in one.status] == [status > 0 for status in simulation.stepper.status]
         assert touched > 10
 
 
@@ -350,36 +350,38 @@ def rough_and_smooth() -> tuple[list[str], list[str]]:
 
 
 def test_a_run_says_that_a_step_may_have_several() -> None:
-    (told,), none = rough_and_smooth()
+    (output,), none = rough_and_smooth()
     assert not none
-    assert told.startswith("the friction coefficient is 1.5, and every step has one solution up to 0.")
-    assert "Newton's method takes the one it reaches from the forces of the step before" in told
-    assert "another start" not in told
+    assert output.startswith("the friction coefficient is 1.5, and every step has one solution up to 0.")
+    assert "Newton's method takes the one it reaches from the forces of the step before" in output
+    assert "another start" not in output
     told_of_starts = plausibility.several(2.0, 1.09, sharp=False, timed=True, now=(3, "1.4"), other=2, steps=9)[0]
     assert "surely has one solution up to 1 only (1.4 if the 3 points" in told_of_starts
     assert "(from another start in 2 of 9 steps); take shorter steps," in told_of_starts
-    assert told.endswith(
+    assert output.endswith(
         "take a softer foundation or a smaller coefficient"
     )  # no inertia: shorter steps would not help
 
 
 def test_explain_says_how_much_friction_leaves_one() -> None:
     scene = load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8})
-    (said,) = [one for one in cost.measured(scene).every_step if "one solution" in one]
-    job = Simulation(scene)
-    most = bound(replace(several_solutions.condensed(job.discretisation, job.stepper), friction=np.ones(9)))
-    assert said.startswith("friction: one solution in every step for mu up to ")
-    stated = float(said.removeprefix("friction: one solution in every step for mu up to ").split(";")[0])
+    (message,) = [one for one in cost.measured(scene).every_step if "one solution" in one]
+    simulation = Simulation(scene)
+    most = bound(
+        replace(several_solutions.condensed(simulation.discretisation, simulation.stepper), friction=np.ones(9))
+    )
+    assert message.startswith("friction: one solution in every step for mu up to ")
+    stated = float(message.removeprefix("friction: one solution in every step for mu up to ").split(";")[0])
     assert 0.9 * most <= stated <= most
-    assert said.endswith("this scene has 0.2")
+    assert message.endswith("this scene has 0.2")
     for keys, words in (
         ({"contact.friction": {"cohesion": 1.0}}, []),
         ({"contact.friction": {"coefficient": 0.5, "kinetic": 0.2, "speed": 1.0}}, ["depends on the slip speed"]),
         ({"contact.stiffness": "rigid", "contact.quadrature": "gauss-2"}, ["share their forces in many ways"]),
     ):
-        told = [one for one in cost.measured(scene.override(**keys)).every_step if "one solution" in one]
-        assert len(told) == len(words)
-        assert all(word in one for word, one in zip(words, told, strict=True))
+        output = [one for one in cost.measured(scene.override(**keys)).every_step if "one solution" in one]
+        assert len(output) == len(words)
+        assert all(word in one for word, one in zip(words, output, strict=True))
 
 
 @pytest.mark.mpi

@@ -70,7 +70,7 @@ def test_every_kind_of_run_is_drawn(name: str, tmp_path: Path) -> None:
         assert image.n_frames == 1 + done.summary["steps"]
     page = Page((tmp_path / "view" / "report.html").read_text())
     assert page.images == len(expected) - 1
-    assert "right:" in page.words and done.summary["stamp"]["scene_hash"] in page.words
+    assert "completed:" in page.words and done.summary["stamp"]["scene_hash"] in page.words
     norm = next(iter(done.summary["norms"].values()))
     assert f"{norm:.6g}" in page.words
 
@@ -96,8 +96,8 @@ def test_a_run_that_was_stopped_is_drawn_too(small: Small, tmp_path: Path) -> No
     warmslip.run(small(), out=tmp_path)
     (tmp_path / "summary.json").unlink()
     view.view(tmp_path, tmp_path / "view", animate=False, at=0.5)
-    said = (tmp_path / "view" / "report.html").read_text()
-    assert "did not end" in said and "at t = 0.5" in said
+    message = (tmp_path / "view" / "report.html").read_text()
+    assert "did not end" in message and "at t = 0.5" in message
     assert not (tmp_path / "view" / "animation.gif").exists()
 
 
@@ -120,8 +120,8 @@ def test_length_along_lines_open_closed_and_several() -> None:
 def test_the_command_says_what_it_wrote_and_what_it_cannot(command: Command) -> None:
     keys = ["--set", "mesh.n=4", "--set", "time.steps=2", "--out", "run"]
     assert command("run", "paper_mixed", *keys).returncode == 0
-    told = command("view", "run", "--out", "seen", "--at", "0.5")
-    assert told.returncode == 0 and "report.html in seen" in told.stdout
+    output = command("view", "run", "--out", "seen", "--at", "0.5")
+    assert output.returncode == 0 and "report.html in seen" in output.stdout
     beyond = command("view", "run", "--out", "seen", "--at", "3")
     assert beyond.returncode == 2 and "from t = 0 to 1, not at 3" in beyond.stderr
     nothing = command("view", ".", "--out", "seen")
@@ -138,21 +138,21 @@ def test_a_status_has_one_colour_in_every_figure(small: Small, tmp_path: Path) -
     with opened(tmp_path) as t:
         d = t.discretisation()
         last, parts, history = body(t, d, 4), view._parts(t, d, 4), view._history(t, d)
-        shown, told = drawings.bodies(last, 5.0)
+        display, output = drawings.bodies(last, 5.0)
         points, _ = drawings.contact(parts, 1.0)
         lines, _ = drawings.history(t.series("steps")["time"], history)
-    for figure in (shown, points):
+    for figure in (display, points):
         (legend,) = figure.legends
         assert [text.get_text() for text in legend.get_texts()] == [name for name, _ in drawings.STATUS]
         assert [dot.get_markerfacecolor() for dot in legend.legend_handles] == [c for _, c in drawings.STATUS]
     (panel,) = (ax for ax in lines.axes if ax.get_title() == "contact points")
     assert [(line.get_label(), line.get_color()) for line in panel.lines] == list(drawings.STATUS)
     present = {drawings.STATUS[int(i)][1] for i in last.status}
-    assert {dot.get_markerfacecolor() for dot in shown.axes[0].lines if len(dot.get_xdata())} == present
-    assert shown.get_suptitle() == "t = 1, displacement 5 times magnified" and "5 times magnified" in told
-    plain, said = drawings.bodies(last, 1.0)
-    assert plain.get_suptitle() == "t = 1" and "magnified" not in said
-    for figure in (shown, points, lines, plain):
+    assert {dot.get_markerfacecolor() for dot in display.axes[0].lines if len(dot.get_xdata())} == present
+    assert display.get_suptitle() == "t = 1, displacement 5 times magnified" and "5 times magnified" in output
+    plain, message = drawings.bodies(last, 1.0)
+    assert plain.get_suptitle() == "t = 1" and "magnified" not in message
+    for figure in (display, points, lines, plain):
         plt.close(figure)
 
 

@@ -45,15 +45,15 @@ def test_every_scene_has_its_number() -> None:
 
 def test_first_steps_lists_what_the_command_lists(command: Command) -> None:
     page = (DOCS / "tutorial.md").read_text()
-    shown = page.partition("$ warmslip list\n")[2].partition("$ ")[0]
-    assert shown == command("list").stdout
+    display = page.partition("$ warmslip list\n")[2].partition("$ ")[0]
+    assert display == command("list").stdout
 
 
 @pytest.mark.parametrize("name", PINNED)
 def test_a_scene_from_its_file_and_from_python(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = Path(str(resources.files("warmslip") / "scenes"))
     result = warmslip.run(warmslip.load(name))
-    assert result.outcome == "right"
+    assert result.outcome == "completed"
     norm, value = PINNED[name]
     assert result.summary["norms"][norm] == pytest.approx(value, rel=2e-9)
     for file in (*folder.glob("*.msh"), folder / f"{name}.toml"):  # elsewhere, the mesh beside it
@@ -84,9 +84,9 @@ def test_a_plan_needs_no_run(name: str) -> None:
     assert found.every_step
     assert found.removable == {}  # the library carries nothing that does nothing
     assert plan.pruned(scene) == scene
-    said = plan.text(found)
-    assert ("no viscosity" in said) == (scene.moves and scene.viscosity is None)
-    assert ("displacement" in said) == scene.moves
+    message = plan.text(found)
+    assert ("no viscosity" in message) == (scene.moves and scene.viscosity is None)
+    assert ("displacement" in message) == scene.moves
 
 
 IDLE: dict[str, dict[str, Any]] = {
@@ -116,7 +116,7 @@ def test_what_can_be_left_out_changes_nothing(key: str) -> None:
     smaller = plan.pruned(scene)
     assert smaller != scene
     full, less = warmslip.run(scene), warmslip.run(smaller)
-    assert full.outcome == less.outcome == "right"
+    assert full.outcome == less.outcome == "completed"
     for name in ("u", "w", "theta"):
         one, other = getattr(less, name), getattr(full, name)
         assert one is not None or np.abs(other).max() == 0
@@ -166,11 +166,11 @@ def test_heat_that_may_be_there_is_not_left_out(change: dict[str, Any]) -> None:
 
 
 def test_the_command_says_what_it_costs(command: Command) -> None:
-    told = command("explain", "paper_mixed", "--set", "mesh.n=8").stdout
-    assert "CHOLMOD" in told
-    assert "243 unknowns, 9 contact points" in told
-    assert "ms a step" in told
-    assert "contact on 'bottom': whether it touches is known only by running" in told
+    output = command("explain", "paper_mixed", "--set", "mesh.n=8").stdout
+    assert "CHOLMOD" in output
+    assert "243 unknowns, 9 contact points" in output
+    assert "ms a step" in output
+    assert "contact on 'bottom': whether it touches is known only by running" in output
     assert "cost here" not in command("explain", "heat_slab", "--no-trial").stdout
 
 
@@ -221,25 +221,25 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, name
 
 def test_the_column_creeps_as_its_two_exponentials_say() -> None:
     """The contact force at the end is the essay's, and the touch is where Kelvin-Voigt's column reaches the gap."""
-    job = warmslip.Simulation(warmslip.load("creep_column"))
-    force = [report.normal_force for _, report in job.steps()]
+    simulation = warmslip.Simulation(warmslip.load("creep_column"))
+    force = [report.normal_force for _, report in simulation.steps()]
     young, height, stiffness, gap, traction = 3.0, 2.0, 7.0, 0.3, 1.2
     final = stiffness * (height * (traction + stiffness * gap) / (young + stiffness * height) - gap)
     assert final == pytest.approx(0.618, abs=5e-4)  # as its essay says
     assert force[-1] == pytest.approx(final, rel=1e-11)
     touch = -0.5 * np.log(1 - gap / height / (traction / young))
-    assert job.scene.step * np.count_nonzero(np.array(force) == 0) == pytest.approx(touch, abs=0.05)
+    assert simulation.scene.step * np.count_nonzero(np.array(force) == 0) == pytest.approx(touch, abs=0.05)
 
 
 def test_the_cylinder_presses_as_hertz_says() -> None:
     """From a block of finite size: peak pressure and half-width belong to the force within a hundredth."""
-    job = warmslip.Simulation(warmslip.load("hertz"))
-    for state, report in job.steps():
+    simulation = warmslip.Simulation(warmslip.load("hertz"))
+    for state, report in simulation.steps():
         pressure, force = state.contact["pressure"], report.normal_force
     peak = np.sqrt(force / (1 - 0.3**2) / (np.pi * 4.0))
     x, weights = (
-        np.asarray(job.discretisation.surface.positions)[:, 0] - 6,
-        np.asarray(job.discretisation.surface.weights),
+        np.asarray(simulation.discretisation.surface.positions)[:, 0] - 6,
+        np.asarray(simulation.discretisation.surface.weights),
     )
     width = 2 * np.sqrt((weights * pressure) @ x**2 / force)
     assert pressure.max() == pytest.approx(peak, rel=1e-2)
@@ -247,9 +247,9 @@ def test_the_cylinder_presses_as_hertz_says() -> None:
 
 
 def test_the_waves_shake_the_body_and_do_not_drag_it() -> None:
-    job = warmslip.Simulation(warmslip.load("wavy_road"))
+    simulation = warmslip.Simulation(warmslip.load("wavy_road"))
     touching = []
-    for state, report in job.steps():
+    for state, report in simulation.steps():
         assert np.abs(state.contact["friction traction"]).max() == 0
         touching.append(report.stick + report.slip)
     assert min(touching[10:]) > 0 and max(touching[10:]) < len(state.contact["gap"])  # always in part
@@ -282,9 +282,9 @@ def test_a_plan_states_the_heat_that_contact_leads_and_makes() -> None:
     scene = warmslip.load("brake_pad")
     exchange, share = scene.contacts[0].heat_exchange, scene.contacts[0].friction_heating.share
     values = {"contact.heat_exchange.conductance": 2.0, "contact.heat_exchange.per_pressure": 0.5}
-    said = plan.text(plan.plan(scene.override(**values)))
-    assert "heat exchange on 'bottom' at its contact nodes, with the conductance 2 + 0.5 times the pressure" in said
-    assert f"heat of friction on 'bottom', of which {share:g} goes into the body" in said
+    message = plan.text(plan.plan(scene.override(**values)))
+    assert "heat exchange on 'bottom' at its contact nodes, with the conductance 2 + 0.5 times the pressure" in message
+    assert f"heat of friction on 'bottom', of which {share:g} goes into the body" in message
     assert (exchange.per_pressure > 0) == ("times the pressure" in plan.text(plan.plan(scene)))
     assert "times the pressure" not in plan.text(plan.plan(warmslip.load("paper_mixed")))
 
@@ -292,7 +292,7 @@ def test_a_plan_states_the_heat_that_contact_leads_and_makes() -> None:
 def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
     """Two sides of a square as one part: their corner has a point for each."""
     bent = warmslip.load("quasistatic_punch").override(**{"mesh.n": 4, "time.steps": 5, "contact.part": "left"})
-    assert not any("differ in normal" in said for said in cost.measured(bent).suspicious)
+    assert not any("differ in normal" in message for message in cost.measured(bent).suspicious)
     mesh = materials.make_mesh(bent)
     parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
     parts = {"top": parts["top"], "shoe": np.concatenate([parts["left"], parts["bottom"]])}
@@ -307,8 +307,8 @@ def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
     file = bent.override(
         **{"mesh.file": str(tmp_path / "bent.msh"), "mesh.n": None, "mesh.shape": None, "contact.part": "shoe"}
     )
-    (said,) = [s for s in cost.measured(file).suspicious if "differ in normal" in s]
-    assert said.startswith("10 contact points at 9 nodes: around 1 of them")
+    (message,) = [s for s in cost.measured(file).suspicious if "differ in normal" in s]
+    assert message.startswith("10 contact points at 9 nodes: around 1 of them")
 
 
 SAID = {
@@ -327,7 +327,7 @@ SAID = {
 
 @pytest.mark.parametrize("name", [name for name in library() if name != "hertz"])
 def test_what_a_run_says(name: str) -> None:
-    said, expected = warmslip.run(warmslip.load(name)).summary["warnings"], SAID.get(name, [])
-    assert len(said) == len(expected) and all(
-        one.startswith(words) for one, words in zip(said, expected, strict=True)
-    ), said
+    message, expected = warmslip.run(warmslip.load(name)).summary["warnings"], SAID.get(name, [])
+    assert len(message) == len(expected) and all(
+        one.startswith(words) for one, words in zip(message, expected, strict=True)
+    ), message

@@ -21,8 +21,8 @@ def test_heat_of_friction_that_expands_the_body_is_said() -> None:
         "heat": {"conductivity": 1.0, "capacity": 1.0, "expansion": {"tensor": 1e-3}},
     }
     one = body(PRESSED, **rubs)
-    (said,) = [one for one in plausible_data.of_scene(one) if "presses harder" in one]
-    assert said.startswith("the friction of 'bottom', 0.3, heats a body that expands")
+    (message,) = [one for one in plausible_data.of_scene(one) if "presses harder" in one]
+    assert message.startswith("the friction of 'bottom', 0.3, heats a body that expands")
     for cured in ({"heat.expansion": None}, {"contact.friction.coefficient": 0.0}, {"contact.friction_heating": None}):
         assert not [word for word in plausible_data.of_scene(one.override(**cured)) if "presses harder" in word]
 
@@ -57,7 +57,7 @@ def test_what_is_left_open_stays_open_when_a_key_is_replaced() -> None:
 
 
 def cantilever(ratio: float, mesh: dict[str, Any]) -> float:
-    """Tip displacement under a shear traction, 4 bricks in height and 20 in length, over that of beam theory with shear."""
+    """Tip displacement under a shear traction, 4 cells in height and 20 in length, over that of beam theory with shear."""
     space = mesh["shape"] == "cube"
     scene = build(
         {

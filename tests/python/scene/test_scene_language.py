@@ -212,9 +212,9 @@ def test_there_is_no_z_in_the_plane() -> None:
     keys = {"loads.body": ["z", 0.0], "contact.gap": "0.1 * z", "supports.displacement": {"top": ["z * t", 0.0]}}
     with pytest.raises(SceneError) as refused:
         load("paper_mixed").override(**keys)
-    said = str(refused.value).splitlines()
-    assert [line.split(":")[0] for line in said] == ["loads.body.0", "supports.displacement.top.0", "contact.gap"]
-    assert all("has a z, and the body lies in the plane" in line for line in said)
+    message = str(refused.value).splitlines()
+    assert [line.split(":")[0] for line in message] == ["loads.body.0", "supports.displacement.top.0", "contact.gap"]
+    assert all("has a z, and the body lies in the plane" in line for line in message)
     load("block_3d").override(**{"contact.gap": "0.1 * z"})
 
 

@@ -46,11 +46,11 @@ def test_a_resumed_run_ends_the_same(tmp_path: Path, more: tuple[str, ...], step
     taken: list[int] = []
     again = warmslip.run(scene(*more), out=tmp_path / "torn", resume=True, progress=lambda step, *_: taken.append(step))
     assert taken[0] == steps // 5 * 5 + 1
-    assert again.outcome == "right"
+    assert again.outcome == "completed"
     for name in ("u", "w", "theta"):
         assert np.array_equal(getattr(whole, name), getattr(again, name))
-    for told in ("identities", "digits"):
-        assert again.summary[told] == whole.summary[told]
+    for output in ("balances", "digits"):
+        assert again.summary[output] == whole.summary[output]
     assert again.summary["steps"] == 24
     same(tmp_path / "whole", tmp_path / "torn")
     assert not any((tmp_path / "torn" / name).exists() for name in checkpoint.NAMES)
@@ -101,8 +101,8 @@ def test_a_torn_checkpoint_is_passed_over_for_the_one_before(tmp_path: Path) -> 
         warmslip.run(scene(), out=tmp_path, progress=stop_after(13))
     newest, previous = (tmp_path / name for name in checkpoint.NAMES)
     whole = newest.read_bytes()
-    job = Simulation(scene())
-    assert job.resume(tmp_path) == 10
+    simulation = Simulation(scene())
+    assert simulation.resume(tmp_path) == 10
     for spoiled in (whole[: len(whole) // 2], whole[:-200] + bytes(200), b"", whole[:900] + b"x" + whole[901:]):
         newest.write_bytes(spoiled)
         assert Simulation(scene()).resume(tmp_path) == 5
@@ -123,7 +123,7 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
 LONG = ["mesh.n=32", "time.steps=1200", "output.every=50", "output.checkpoint=40"]
 
 
-@pytest.mark.parametrize("shorter", ["steps/slip", "ledger/friction", "contact/status", "states/theta"])
+@pytest.mark.parametrize("shorter", ["steps/slip", "balances/friction", "contact/status", "states/theta"])
 def test_a_series_that_lacks_its_last_row_cuts_the_others(tmp_path: Path, shorter: str) -> None:
     warmslip.run(scene("output.every=1"), out=tmp_path)
     path = tmp_path / "trajectory.h5"
@@ -207,9 +207,9 @@ def test_a_checkpoint_changes_no_bit(more: tuple[str, ...]) -> None:
     """Wherever it is written, as an interruption or the clock has it: what a stepper forgets there it makes again alike."""
     plain, forgetful = warmslip.Simulation(scene(*more)), warmslip.Simulation(scene(*more))
     for _ in zip(plain.steps(), forgetful.steps(), strict=True):
-        forgetful.stepper.forget()
+        forgetful.stepper.clear_cache()
     for name in ("u", "w", "theta"):
-        one, other = (np.asarray(getattr(job.stepper, name).array) for job in (plain, forgetful))
+        one, other = (np.asarray(getattr(simulation.stepper, name).array) for simulation in (plain, forgetful))
         assert np.array_equal(one, other), name
 
 
@@ -234,12 +234,12 @@ def test_an_interrupted_run_is_resumable(tmp_path: Path, number: signal.Signals)
     before = signal.getsignal(number)
     torn = warmslip.run(scene(), out=tmp_path / "torn", progress=interrupt)
     assert signal.getsignal(number) is before
-    assert torn.outcome == "interrupted" and not torn.right and torn.summary["steps"] == 8
+    assert torn.outcome == "interrupted" and not torn.completed and torn.summary["steps"] == 8
     assert json.loads((tmp_path / "torn" / "summary.json").read_text())["outcome"] == "interrupted"
     taken: list[int] = []
     again = warmslip.run(scene(), out=tmp_path / "torn", resume=True, progress=lambda step, *_: taken.append(step))
     assert taken[0] == 9  # from where it was, not from the checkpoint of step 5
-    assert again.right and np.array_equal(again.u, whole.u) and np.array_equal(again.theta, whole.theta)
+    assert again.completed and np.array_equal(again.u, whole.u) and np.array_equal(again.theta, whole.theta)
     assert not (tmp_path / "torn" / "checkpoint.npz").exists()
 
 
@@ -255,9 +255,9 @@ def test_ctrl_c_ends_with_its_own_exit_code(tmp_path: Path, ranks: int) -> None:
     while not (tmp_path / "checkpoint.npz").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=300)
+    message, _ = process.communicate(timeout=300)
     assert process.returncode == 130 or ranks > 1  # mpirun has an exit code of its own
-    assert process.returncode != 0 and "--resume goes on" in said
+    assert process.returncode != 0 and "--resume goes on" in message
 
 
 def test_a_run_with_functions_is_not_resumed_without_them(tmp_path: Path) -> None:
@@ -297,7 +297,7 @@ def test_the_end_of_another_scene_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"summary.json is of another scene; run it as it was"):
         warmslip.run(scene("contact.stiffness=20.0"), out=tmp_path, resume=True)
     assert json.loads((tmp_path / "summary.json").read_text())["stamp"]["scene_hash"] == scene().digest()
-    assert warmslip.run(scene(), out=tmp_path, resume=True).right
+    assert warmslip.run(scene(), out=tmp_path, resume=True).completed
 
 
 def test_a_run_that_has_ended_right_is_not_computed_again(tmp_path: Path) -> None:
@@ -312,7 +312,7 @@ def test_a_run_that_has_ended_right_is_not_computed_again(tmp_path: Path) -> Non
     written = (tmp_path / "trajectory.h5").stat().st_mtime_ns
     second = again(scene())
     assert not taken and (tmp_path / "trajectory.h5").stat().st_mtime_ns == written
-    assert second.right and second.summary == json.loads(json.dumps(first.summary))
+    assert second.completed and second.summary == json.loads(json.dumps(first.summary))
     assert all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("u", "w", "theta"))
     law = {"bottom": warmslip.Law(friction=lambda p, s: (0.1 * p, 0.1, 0.0))}
     again(scene(), laws=law)  # a law is not told from another by its end

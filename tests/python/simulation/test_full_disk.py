@@ -71,7 +71,7 @@ def test_a_disk_that_is_full_at_the_end_loses_nothing(tmp_path: Path, monkeypatc
     same(tmp_path / "whole", tmp_path / "run")
     monkeypatch.undo()
     again = warmslip.run(one, out=tmp_path / "run", resume=True)
-    assert again.right and np.array_equal(again.u, whole.u)
+    assert again.completed and np.array_equal(again.u, whole.u)
     left = {path.name for path in (tmp_path / "run").iterdir()}
     assert left == {"trajectory.h5", "summary.json", "final.vtu"}
     assert (tmp_path / "run" / "final.vtu").read_bytes() == (tmp_path / "whole" / "final.vtu").read_bytes()

@@ -42,10 +42,10 @@ def test_a_full_course_keeps_the_largest_of_two() -> None:
 
 
 def test_a_climb_of_the_data_is_no_growth() -> None:
-    for pace, grows in ((0.0, True), (0.001, True), (0.05, False)):
+    for steps_per_level, grows in ((0.0, True), (0.001, True), (0.05, False)):
         course, found = growth.start(), []
         for n in range(300):
-            growth.add(course, [0.05 * n, pace * n, 3.0])
+            growth.add(course, [0.05 * n, steps_per_level * n, 3.0])
             found.append(growth.climb(course))
         assert any(found) == grows
 

@@ -124,8 +124,8 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
 
 @pytest.mark.parametrize(("scene", "words"), BEFORE, ids=[f"{i}" for i in range(len(BEFORE))])
 def test_before_a_run_and_after_it(scene: Scene, words: str | None) -> None:
-    planned, said = cost.measured(scene).warnings, warnings(scene)
-    for found in (planned, said):
+    planned, message = cost.measured(scene).warnings, warnings(scene)
+    for found in (planned, message):
         if words is None:
             assert not found, found
         else:
@@ -157,8 +157,8 @@ AFTER = [
 
 @pytest.mark.parametrize(("scene", "words"), AFTER, ids=[words for _, words in AFTER])
 def test_after_a_run(scene: Scene, words: str) -> None:
-    said = warnings(scene)
-    assert any(one.startswith(words) for one in said), said
+    message = warnings(scene)
+    assert any(one.startswith(words) for one in message), message
     assert not any(words in one for one in cost.measured(scene).warnings)
 
 
@@ -252,8 +252,8 @@ def test_undershoots_are_counted() -> None:
     ],
 )
 def test_what_temperatures_the_data_allow(keys: dict[str, Any], allowed: tuple[float, float]) -> None:
-    job = warmslip.Simulation(HOT.override(**keys))
-    assert job.monitor._allowed == pytest.approx(allowed)
+    simulation = warmslip.Simulation(HOT.override(**keys))
+    assert simulation.monitor._allowed == pytest.approx(allowed)
 
 
 def test_heating_and_friction_leave_no_bound() -> None:
@@ -281,8 +281,8 @@ def test_a_step_looks_at_no_field(monkeypatch: pytest.MonkeyPatch) -> None:
     """Strains at most five times, however many the steps, and a field is gathered for nothing else before the end."""
     ordinary, gathered = Discretisation.field, []
     monkeypatch.setattr(Discretisation, "field", lambda self, vec: gathered.append(1) or ordinary(self, vec))
-    job = warmslip.Simulation(body(PRESSED, time__steps=200))
-    for _ in job.steps():
+    simulation = warmslip.Simulation(body(PRESSED, time__steps=200))
+    for _ in simulation.steps():
         pass
     assert 1 <= len(gathered) <= 5
 
@@ -305,7 +305,7 @@ def test_a_resumed_run_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyP
         patched.setattr(signals.Interruption, "agreed", lambda *_: (asked.append(1) or len(asked) == 27, False))
         assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
     again = warmslip.run(scene, out=tmp_path, resume=True)
-    assert again.right and again.summary["warnings"] == whole
+    assert again.completed and again.summary["warnings"] == whole
 
 
 def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -320,40 +320,40 @@ def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyP
         patched.setattr(signals.Interruption, "agreed", lambda *_: (asked.append(1) or len(asked) == 175, False))
         assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
     again = warmslip.run(scene, out=tmp_path, resume=True)
-    assert again.right and again.summary["warnings"] == whole
+    assert again.completed and again.summary["warnings"] == whole
 
 
-@pytest.mark.parametrize(("mechanical", "told"), [(0.0, True), (1.0, True), (1e3, False)])
-def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, told: bool) -> None:
+@pytest.mark.parametrize(("mechanical", "warned"), [(0.0, True), (1.0, True), (1e3, False)])
+def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, warned: bool) -> None:
     """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
-    job = warmslip.Simulation(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
+    simulation = warmslip.Simulation(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
     for n in range(60):
         heat = 1.2**n
-        ledger = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
-        job.monitor._growth(ledger, [])
-    assert bool(job.monitor.fed()) == told
-    share = job.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
+        balances = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
+        simulation.monitor._growth(balances, [])
+    assert bool(simulation.monitor.fed()) == warned
+    share = simulation.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
     assert share == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.mpi
 def test_two_ranks_say_it_once_and_the_same(command: Command, tmp_path: Path) -> None:
-    said = []
+    message = []
     for ranks in (1, 2):
         done = command("run", "sliding_block", "--set", "time.steps=100", "--out", f"run{ranks}", ranks=ranks)
         assert done.returncode == 0, done.stderr
         found = json.loads((tmp_path / f"run{ranks}/summary.json").read_text())["warnings"]
         assert done.stderr.count("warning: ") == len(found) > 0
         assert all(f"warning: {one}" in done.stderr for one in found)
-        said.append(found)
-    assert said[0] == said[1]
+        message.append(found)
+    assert message[0] == message[1]
 
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("capacity", ["lumped", "consistent"])
 @pytest.mark.parametrize("level", [1.0, 293.15])
 def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str, level: float) -> None:
-    job = warmslip.Simulation(
+    simulation = warmslip.Simulation(
         build(
             {
                 "mesh": {"shape": "square" if d == 2 else "cube", "n": [2, 3, 2][:d]},
@@ -363,6 +363,6 @@ def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str
             }
         )
     )
-    for _ in job.steps():
+    for _ in simulation.steps():
         pass
-    assert not [said for said in summary(job)["warnings"] if "the data allow" in said]
+    assert not [message for message in summary(simulation)["warnings"] if "the data allow" in message]

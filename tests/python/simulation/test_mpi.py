@@ -45,7 +45,7 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, case
     for ranks in (1, 2):
         result = command("run", scene, *options, "--out", f"run{ranks}", ranks=ranks)
         assert result.returncode == 0, result.stderr
-        assert result.stdout.count("right:") == 1
+        assert result.stdout.count("completed:") == 1
         summaries.append(json.loads((tmp_path / f"run{ranks}/summary.json").read_text()))
         with Trajectory(tmp_path / f"run{ranks}/trajectory.h5") as t:
             ends.append([t.u[-1], t.w[-1], t.theta[-1], t.series("contact")["force"][-1]])
@@ -54,7 +54,7 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, case
     assert two["norms"] == pytest.approx(one["norms"], rel=1e-10)
     for name in ("normal_force", "tangential_force", "max_penetration", "open", "stick", "slip"):
         assert two["contact"][name] == pytest.approx(one["contact"][name], rel=1e-9), name
-    assert all(summary["identities"][i] <= 1e-11 for summary in summaries for i in ("energy", "heat", "force", "law"))
+    assert all(summary["balances"][i] <= 1e-11 for summary in summaries for i in ("energy", "heat", "force", "law"))
     for a, b in zip(*ends, strict=True):  # mesh numbering: field by field, point by point
         assert abs(a - b).max() <= 1e-9 * abs(a).max()
 
@@ -107,7 +107,7 @@ def observer(state, report):
 law = warmslip.Law(compliance=lambda r: (10 * r, 10.0, 5 * r**2))
 scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 3})
 done = warmslip.run(scene, laws={"bottom": law}, observers=[observer])
-assert done.right
+assert done.completed
 from mpi4py import MPI
 everyone = MPI.COMM_WORLD.allgather(found)
 assert all(one == everyone[0] for one in everyone)
@@ -119,15 +119,15 @@ if MPI.COMM_WORLD.rank == 0:
 @pytest.mark.mpi
 def test_states_and_laws_are_the_same_on_any_number_of_ranks(tmp_path: Path) -> None:
     (tmp_path / "observing.py").write_text(OBSERVING)
-    told = []
+    output = []
     for ranks in (1, 2):
         command = ["mpirun", "-n", str(ranks), sys.executable, str(tmp_path / "observing.py")]
         result = subprocess.run(
             command, env=child_environment(), text=True, capture_output=True, timeout=300, cwd=tmp_path, check=True
         )
-        told.append(np.array(json.loads(re.findall(r"\[\[.*\]\]", result.stdout)[0])))
-    assert told[0].shape == (3, 5) and (told[0][:, :4] > 0).all()
-    assert told[1] == pytest.approx(told[0], rel=1e-10, abs=1e-13)
+        output.append(np.array(json.loads(re.findall(r"\[\[.*\]\]", result.stdout)[0])))
+    assert output[0].shape == (3, 5) and (output[0][:, :4] > 0).all()
+    assert output[1] == pytest.approx(output[0], rel=1e-10, abs=1e-13)
 
 
 def launched(folder: Path, *words: object) -> subprocess.CompletedProcess[str]:
@@ -170,11 +170,11 @@ def test_ranks_may_collect_a_dropped_run_at_different_times(tmp_path: Path) -> N
 
 
 def test_a_dropped_run_frees_its_memory_at_once() -> None:
-    job = Simulation(load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
-    for _ in job.steps():
+    simulation = Simulation(load("block_3d").override(**{"mesh.n": 2, "time.steps": 1}))
+    for _ in simulation.steps():
         pass
-    dropped = weakref.ref(job)
-    del job
+    dropped = weakref.ref(simulation)
+    del simulation
     assert dropped() is None
 
 
@@ -214,12 +214,12 @@ def test_a_rank_that_fails_alone_ends_all(tmp_path: Path, how: str, rank: int) -
     (tmp_path / "script.py").write_text(FAILING_ALONE)
     result = launched(tmp_path, "-n", "2", sys.executable, "script.py", how, rank)
     assert result.returncode != 0
-    said = {"raises": "ValueError: no such thing", "out of memory": "MemoryError: no room", "is killed": "signal 9"}
+    message = {"raises": "ValueError: no such thing", "out of memory": "MemoryError: no room", "is killed": "signal 9"}
     if how == "everywhere":
         assert result.stderr.count("ValueError: no such thing") == 2
         assert "failed alone" not in result.stderr
     else:
-        assert result.stderr.count(said[how]) == 1
+        assert result.stderr.count(message[how]) == 1
         assert result.stderr.count(f"rank {rank} failed alone: all ranks are ended") == (how != "is killed")
 
 

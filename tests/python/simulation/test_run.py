@@ -13,7 +13,7 @@ import pytest
 
 import warmslip
 from warmslip import Loads, Scene, Trajectory, _core
-from warmslip.io.trajectory_writer import LEDGER
+from warmslip.io.trajectory_writer import BALANCES
 from warmslip.model.discretisation import discretise
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import worse
@@ -43,14 +43,14 @@ def test_summary_holds_what_others_script_against(small: MakeScene, tmp_path: Pa
     result = warmslip.run(small(), out=tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary == json.loads(json.dumps(result.summary))
-    assert summary["outcome"] == "right"
-    assert result.right
+    assert summary["outcome"] == "completed"
+    assert result.completed
     assert summary["steps"] == 4
     assert summary["time"] == pytest.approx(1)
     assert set(summary["norms"]) == {"u_V", "u_L2", "w_L2", "theta_L2"}
     assert {"normal_force", "tangential_force", "max_penetration", "open", "stick", "slip"} <= set(summary["contact"])
-    assert {"energy", "heat", "force", "law"} <= set(summary["identities"])
-    assert all(summary["identities"][i] <= 1e-11 for i in ("energy", "heat", "force", "law"))
+    assert {"energy", "heat", "force", "law"} <= set(summary["balances"])
+    assert all(summary["balances"][i] <= 1e-11 for i in ("energy", "heat", "force", "law"))
     assert summary["newton"]["iterations"] >= summary["newton"]["largest_step"] >= 1
     assert summary["cpu_seconds"] > 0
     assert summary["memory_bytes"] > 2**20
@@ -91,7 +91,7 @@ def test_trajectory_holds_the_run(small: MakeScene, tmp_path: Path) -> None:
             np.testing.assert_array_equal(getattr(t, name)[-1], getattr(result, name))
         np.testing.assert_allclose(t.u[2] - t.u[1], 0.25 * t.w[2], rtol=0, atol=1e-16)
         assert len(t.series("steps")["newton_iterations"]) == 4
-        assert set(t.series("ledger")) == set(LEDGER)
+        assert set(t.series("balances")) == set(BALANCES)
         contact = t.series("contact")
         assert contact["force"].shape == contact["displacement"].shape == (4, 5, 2)
         assert contact["status"].shape == (4, 5)
@@ -107,10 +107,10 @@ def test_trajectory_and_summary_agree(small: MakeScene, tmp_path: Path) -> None:
     scene = small(contact__gap=-1e-3, time__steps=5)
     contact = warmslip.run(scene, out=tmp_path).summary
     with Trajectory(tmp_path / "trajectory.h5") as t:
-        steps, ledger = t.series("steps"), t.series("ledger")
+        steps, balances = t.series("steps"), t.series("balances")
         assert steps["time"] == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
         for name in ("energy", "heat", "force", "law"):
-            assert contact["identities"][name] == ledger[f"{name}_residual"].max()
+            assert contact["balances"][name] == balances[f"{name}_residual"].max()
         bottom = t.u[-1][:5]
     assert contact["contact"]["max_penetration"] == pytest.approx((-bottom[:, 1]).max() + 1e-3, rel=1e-12)
 
@@ -119,20 +119,22 @@ def test_restart_under_a_moving_gap(small: MakeScene) -> None:
     """The energy that a moving foundation puts in is that of the gap before and after, and a restart knows the former."""
     scene = small("isotropic", time__steps=6)
     loads = replace(warmslip.Loads.of(scene), gap=lambda x, t: -1e-3 * (1 + t) + 0 * x[:, 0])
-    job = warmslip.Simulation(scene, loads=loads)
-    ledgers = [report.ledger for _, report in job.steps()]
-    gained = sum(ledger.contact_change for ledger in ledgers)
-    d, half = job.discretisation, warmslip.Simulation(scene, loads=loads)
-    assert gained == pytest.approx(ledgers[-1].contact - 0.5 * 1e4 * 1e-6, rel=1e-9)  # c_nu/2 g(0)^2 over a side of 1
+    simulation = warmslip.Simulation(scene, loads=loads)
+    every_balance = [report.balances for _, report in simulation.steps()]
+    gained = sum(balances.contact_change for balances in every_balance)
+    d, half = simulation.discretisation, warmslip.Simulation(scene, loads=loads)
+    assert gained == pytest.approx(
+        every_balance[-1].contact - 0.5 * 1e4 * 1e-6, rel=1e-9
+    )  # c_nu/2 g(0)^2 over a side of 1
     marching = half.steps()
     for _ in range(3):
         next(marching)
     state = [d.field(getattr(half.stepper, name)) for name in FIELDS]
     again = d.stepper()
     d.restart(again, state[0], state[1], state[2], 0.5)
-    ledger = again.advance(*d.load_vectors.at(4 / 6)).ledger
+    balances = again.advance(*d.load_vectors.at(4 / 6)).balances
     for name in ("gap_work", "contact_change", "contact"):
-        assert getattr(ledger, name) == pytest.approx(getattr(ledgers[3], name), rel=1e-9), name
+        assert getattr(balances, name) == pytest.approx(getattr(every_balance[3], name), rel=1e-9), name
 
 
 def test_states_are_thinned(small: MakeScene, tmp_path: Path) -> None:
@@ -172,7 +174,7 @@ def test_contact_that_does_not_converge_keeps_the_last_good_step(
     loads = replace(Loads.of(scene), body=lambda x, t: np.full((len(x), 2), -1.0 if t > 0.4 else 0.0), source=0.0)
     result = warmslip.run(scene, out=tmp_path, loads=loads)
     assert result.outcome == "contact_not_converged"
-    assert not result.right
+    assert not result.completed
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["norms"]["u_V"] == 0
     assert (summary["outcome"], summary["steps"]) == ("contact_not_converged", 2)
@@ -212,7 +214,9 @@ def test_loose_iterations_are_seen(small: MakeScene, options: dict[str, str], fi
     sheared = {"loads__body": [1.0, 0.0], "loads__traction": {}, "heat__heating__tensor": [[1.0, 0.0], [0.0, 1.0]]}
     scene = small(mesh__n=16, mesh__diagonal="crisscross", time__steps=8, **free, **alone, **sheared)
     result, direct = warmslip.run(scene, backend="petsc"), warmslip.run(scene)
-    assert result.right and result.summary["cost"]["refinements"] >= 8 and direct.summary["cost"]["refinements"] == 0
+    assert (
+        result.completed and result.summary["cost"]["refinements"] >= 8 and direct.summary["cost"]["refinements"] == 0
+    )
     for name in FIELDS:
         exact = getattr(direct, name)
         assert np.abs(getattr(result, name) - exact).max() <= 1e-9 * np.abs(exact).max()
@@ -226,7 +230,7 @@ def test_loose_iterations_are_seen_where_every_sum_closes(small: MakeScene, opti
     free = {"supports__displacement": [], "heat__expansion__tensor": [[0.0, 0.0], [0.0, 0.0]], "contact__gap": 1.0}
     scene = small(mesh__n=16, mesh__diagonal="crisscross", time__steps=1, time__end=0.125, **apart, **free)
     result = warmslip.run(scene, backend="petsc")
-    assert result.outcome == "identity_violated"
+    assert result.outcome == "balance_violated"
     assert result.summary["failure"]["force"] > 1e-8
 
 
@@ -241,14 +245,14 @@ def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float) ->
         assert result.outcome == "precision_lost" and result.summary["failure"]["digits"]["stress"] < 4
         return
     still = warmslip.run(small("isotropic", supports__displacement=[], contact__gap=1e3, **pulled))
-    assert result.right and result.summary["digits"]["stress"] > (5 if speed > 1 else 10)
+    assert result.completed and result.summary["digits"]["stress"] > (5 if speed > 1 else 10)
     moved = np.array([speed, 0.0])
     assert np.abs(result.w - still.w - moved).max() <= 2e-14 * speed
 
 
 def test_a_foundation_out_of_reach_costs_no_digits(small: MakeScene) -> None:
     far, near = (warmslip.run(small(contact__gap=gap)) for gap in (1e9, 1.0))
-    assert far.right and far.summary["digits"]["u"] > 10
+    assert far.completed and far.summary["digits"]["u"] > 10
     assert np.abs(far.u - near.u).max() <= 1e-14 * np.abs(near.u).max()
 
 
@@ -271,7 +275,7 @@ def test_a_needle_has_the_digits_it_states(small: MakeScene, keys: dict[str, Any
     )
     one, other = warmslip.run(scene), warmslip.run(scene, backend="petsc")
     stated = one.summary["digits"]["u"]
-    assert one.right and other.right and 4 < stated < 9
+    assert one.completed and other.completed and 4 < stated < 9
     assert np.abs(one.u - other.u).max() <= 10 ** (1 - stated) * np.abs(one.u).max()
 
 
@@ -290,14 +294,14 @@ def test_an_impossible_tolerance_is_an_outcome(small: MakeScene) -> None:
 def test_a_state_that_is_not_finite_is_said(small: MakeScene) -> None:
     """Numbers that overflow inside the step: the outcome says so and the state stays as it was."""
     result = warmslip.run(small(loads__body=[0.0, -1e308]))
-    assert result.outcome != "right"
+    assert result.outcome != "completed"
     assert all(np.isfinite(getattr(result, name)).all() for name in FIELDS)
 
 
 @pytest.mark.parametrize(
     ("outcome", "loose", "keys"),
     [
-        ("identity_violated", {"heat_ksp_type": "cg", "heat_pc_type": "none", "heat_ksp_rtol": "0.9"}, {}),
+        ("balance_violated", {"heat_ksp_type": "cg", "heat_pc_type": "none", "heat_ksp_rtol": "0.9"}, {}),
         ("precision_lost", {}, {"mesh__lengths": [1e-6, 1.0]}),  # bending of a needle: no digits left in u
     ],
 )
@@ -307,14 +311,14 @@ def test_a_step_that_does_not_close_its_books_is_not_taken(
     for key, value in loose.items():
         options[key] = value
     result = warmslip.run(small(mesh__n=8, time__steps=8, **keys), backend="petsc")
-    assert (result.outcome, result.right) == (outcome, False)
+    assert (result.outcome, result.completed) == (outcome, False)
     failure = result.summary["failure"]
     assert result.summary["steps"] == failure["step"] - 1
     if outcome == "precision_lost":
         assert failure["digits"]["u"] < 4 and "fewer than four digits of u" in failure["reason"]
     else:
         assert failure["heat"] > 1e-10 and "heat stays open" in failure["reason"]
-    assert all(value <= 1e-10 for value in result.summary["identities"].values())
+    assert all(value <= 1e-10 for value in result.summary["balances"].values())
     if failure["step"] == 1:
         assert not result.u.any()  # the initial state is kept
 
@@ -335,7 +339,7 @@ def test_restart_gives_the_same_end(small: MakeScene, tmp_path: Path, coupling: 
     with Trajectory(tmp_path / "trajectory.h5") as t:
         d.restart(stepper, t.u[3], t.w[3], t.theta[3], float(t.time[3]))
     for n in range(4, 9):
-        assert stepper.advance(*d.load_vectors.at(n * scene.step)).outcome.name == "right"
+        assert stepper.advance(*d.load_vectors.at(n * scene.step)).outcome.name == "completed"
     assert stepper.time == pytest.approx(1)
     for name in FIELDS:
         found, expected = d.field(getattr(stepper, name)), getattr(whole, name)
@@ -369,9 +373,11 @@ def test_backends_agree(small: MakeScene) -> None:
 
 
 def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
-    job = Simulation(small(initial__velocity=[1.0, 0.5], initial__temperature=2.0, initial__displacement=[0.1, 0.2]))
-    d = job.discretisation
-    u, w, theta = (d.field(getattr(job.stepper, name)) for name in FIELDS)
+    simulation = Simulation(
+        small(initial__velocity=[1.0, 0.5], initial__temperature=2.0, initial__displacement=[0.1, 0.2])
+    )
+    d = simulation.discretisation
+    u, w, theta = (d.field(getattr(simulation.stepper, name)) for name in FIELDS)
     top = np.unique(d.mesh.parts["top"])
     cooled = np.unique(np.concatenate([d.mesh.parts[p] for p in ("top", "left", "right")]))
     assert (u[top] == 0).all()
@@ -380,12 +386,12 @@ def test_initial_data_are_used_and_held_on_supports(small: MakeScene) -> None:
     assert (theta[np.setdiff1d(np.arange(25), cooled)] == 2).all()
     assert (w[0] == [1, 0.5]).all()
     assert (u[0] == [0.1, 0.2]).all()
-    assert all(report.outcome.name == "right" for _, report in job.steps())
+    assert all(report.outcome.name == "completed" for _, report in simulation.steps())
 
 
 def test_a_body_at_rest_away_from_the_foundation_stays_there(small: MakeScene) -> None:
     still = {"loads__body": [0.0, 0.0], "loads__traction": {}, "heat__source": 0.0}
     result = warmslip.run(small(contact__gap=0.1, contact__heat_exchange__foundation_temperature=0.0, **still))
-    assert (result.outcome, result.summary["contact"]["open"]) == ("right", 5)
+    assert (result.outcome, result.summary["contact"]["open"]) == ("completed", 5)
     assert not result.u.any()
     assert not result.theta.any()

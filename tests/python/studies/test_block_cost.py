@@ -48,26 +48,26 @@ def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
     before = product.getPerfInfo()["count"]
     assert sum(1 for _ in counted.steps()) == 10
     products = product.getPerfInfo()["count"] - before
-    job = Simulation(block_cost.scene(FULL, chosen))
-    there = [name for name in OPERATORS if getattr(job.discretisation.operators, name) is not None]
+    simulation = Simulation(block_cost.scene(FULL, chosen))
+    there = [name for name in OPERATORS if getattr(simulation.discretisation.operators, name) is not None]
     estimates = counted.stepper.cost.estimates * (("elasticity" in there) + ("heating" in there))
     assert products == 10 * len(there) + estimates and there == sorted(expected(chosen), key=OPERATORS.index)
-    floor = block_cost.Floor(job)
-    for _ in job.steps():
+    floor = block_cost.MinimalStep(simulation)
+    for _ in simulation.steps():
         floor.step()
-    assert job.outcome == "right" and job.taken == 10
-    cost, fields = job.stepper.cost, [chosen["motion"] != "none", chosen["heat"] != "none"]
+    assert simulation.outcome == "completed" and simulation.taken == 10
+    cost, fields = simulation.stepper.cost, [chosen["motion"] != "none", chosen["heat"] != "none"]
     assert (cost.substitutions, cost.factorizations, cost.refinements) == (10 * sum(fields), sum(fields), 0)
     assert (cost.newton_iterations > 0) == (chosen["contact"] != "none")
     assert (cost.momentum_seconds > 0, cost.heat_seconds > 0) == tuple(fields)
     if chosen["contact"] == "none":
-        assert cost.contact_seconds == 0 and len(job.discretisation.surface.weights) == 0
+        assert cost.contact_seconds == 0 and len(simulation.discretisation.surface.weights) == 0
         k = FULL.step
         for name, factor in (("u", 1.0), ("w", k), ("theta", 1.0)):  # a velocity that dies out is the rounding of u / k
-            exact, found = getattr(job.stepper, name), getattr(floor, name)
+            exact, found = getattr(simulation.stepper, name), getattr(floor, name)
             assert (exact is None) == (found is None)
             if exact is not None:
-                size = np.abs(exact.array if name == "theta" else job.stepper.u.array).max()
+                size = np.abs(exact.array if name == "theta" else simulation.stepper.u.array).max()
                 assert factor * np.abs(exact.array - found.array).max() <= 1e-13 * size > 0, name
 
 
@@ -81,7 +81,7 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
         assert row["products"] == len(expected(row)) and {k: row[k] for k in ALL[0]} in ALL
         assert 0 < row["least"] < row["step"] < 10 * row["whole_model"]
         assert row["contact_solver"] > 0 and row["balances"] > 0
-        for name in ("over_whole_model", "over_least", "over_floor"):
+        for name in ("over_whole_model", "linear_over_minimal", "step_over_minimal"):
             assert 0 < row[f"{name}_lower"] <= row[name] <= row[f"{name}_upper"]
     wrong = command("blocks", "--out", "a.csv", "--explained", "b.csv", "--n", "4", "--steps", "7")
     assert wrong.returncode == 2 and "no multiple of 5" in wrong.stderr
@@ -96,7 +96,7 @@ def test_the_ratios_are_those_of_the_seconds_given() -> None:
     settled = {name: block_cost.settled(list(values)) for name, values in seconds.items()}
     assert {len(values) for values in settled.values()} == {28}
     found = block_cost.ratios(**settled)
-    for name, value in (("over_whole_model", 0.5), ("over_least", 1.25), ("over_floor", 10 / 6)):
+    for name, value in (("over_whole_model", 0.5), ("linear_over_minimal", 1.25), ("step_over_minimal", 10 / 6)):
         assert [found[name + end] for end in ("_lower", "", "_upper")] == pytest.approx([value] * 3)
     rising = block_cost.ratios(**settled | {"step": np.linspace(10, 14, 28)})
     assert rising["over_whole_model_lower"] == pytest.approx(0.55) and rising[

@@ -137,18 +137,18 @@ def test_the_front_holds_the_cheap_and_the_accurate(tmp_path: Path) -> None:
 
 def test_a_study_of_any_name_has_its_method_from_its_stamp(tmp_path: Path) -> None:
     for keys, method in (({}, ("staggered", "nodal")), ({"quadrature": "gauss-2"}, ("lagged", "gauss-2"))):
-        told = load("paper_mixed").override(
+        output = load("paper_mixed").override(
             **{"time.coupling": method[0]} | {f"contact.{key}": value for key, value in keys.items()}
         )
-        (tmp_path / "mine.json").write_text(json.dumps({"scene": told.resolved()}))
+        (tmp_path / "mine.json").write_text(json.dumps({"scene": output.resolved()}))
         assert work_precision.method_of(tmp_path / "mine.csv") == method
     assert work_precision.method_of(tmp_path / "mixed_0_lagged_gauss-2.csv") == ("lagged", "gauss-2")
 
 
 def test_disagreement_is_relative_and_sees_every_field() -> None:
     one, other = Simulation(scene(2, 1)), Simulation(scene(2, 1))
-    for job in (one, other):
-        list(job.steps())
+    for simulation in (one, other):
+        list(simulation.steps())
     assert robustness.disagreement(one, other) == 0
     for field in ("u", "w", "theta"):
         vec = getattr(other.stepper, field)

@@ -13,6 +13,7 @@ import pytest
 
 import warmslip
 from warmslip.paper import acceptance, readings
+from warmslip.records import tables
 from warmslip.simulation.statistics import BALANCES
 from warmslip.studies import rates, refinement_study
 from warmslip.studies.error_norms import SUMS, TERMS
@@ -29,11 +30,11 @@ def write(path: Path, rows: list[Row]) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("p", "shown"), [(1.0, (1.10, 1.22, 1.58)), (0.75, (0.90, 1.04, 1.42))])
-def test_bias_of_the_self_reference(p: float, shown: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(("p", "display"), [(1.0, (1.10, 1.22, 1.58)), (0.75, (0.90, 1.04, 1.42))])
+def test_bias_of_the_self_reference(p: float, display: tuple[float, ...]) -> None:
     """A true order measured against the finest solution shows these values, and is recovered from them."""
     errors = [n**-p - REFERENCE**p for n in LEVELS]
-    for n, coarse, fine, expected in zip(LEVELS, errors, errors[1:], shown, strict=False):
+    for n, coarse, fine, expected in zip(LEVELS, errors, errors[1:], display, strict=False):
         assert rates.observed(coarse, fine) == pytest.approx(expected, abs=0.005)
         assert rates.corrected(coarse, fine, 1 / n, REFERENCE, quadratic=False) == pytest.approx(p, abs=1e-9)
 
@@ -79,25 +80,27 @@ def test_williams_exponents_of_the_paper() -> None:
 
 def test_entitled_orders() -> None:
     free = dict(hot=False, singular_conductivity=False, viscosity=(10.0, 5.0))
-    assert rates.entitled("theta_L2", **free) == 1.0
-    assert rates.entitled("theta_L2", **free | {"hot": True}) == 0.75
-    assert rates.entitled("theta_L2", **free | {"singular_conductivity": True}) == 0.5
+    assert rates.expected_order("theta_L2", **free) == 1.0
+    assert rates.expected_order("theta_L2", **free | {"hot": True}) == 0.75
+    assert rates.expected_order("theta_L2", **free | {"singular_conductivity": True}) == 0.5
     both = free | {"hot": True, "singular_conductivity": True}
-    assert rates.entitled("theta_L2", **both) == rates.entitled("u_V", **both) == 0.5
-    assert rates.entitled("w_L2", **free) == 0.75  # tractions that act from t = 0 on a body at rest
-    assert rates.entitled("u_theta", **free) == rates.entitled("u_V", **free) == rates.williams_exponent(10, 5)
+    assert rates.expected_order("theta_L2", **both) == rates.expected_order("u_V", **both) == 0.5
+    assert rates.expected_order("w_L2", **free) == 0.75  # tractions that act from t = 0 on a body at rest
+    assert (
+        rates.expected_order("u_theta", **free) == rates.expected_order("u_V", **free) == rates.williams_exponent(10, 5)
+    )
 
 
 def study_rows(order: float = 1.0, scale: float = 1.5, larger: float = 1.0) -> list[Row]:
     rows = []
     for n in (*LEVELS, 256):
         e = dict.fromkeys([*TERMS, *SUMS], scale * n**-order)
-        row = {"n": n, "steps": n, "h": 1 / n, "k": 1 / n, "outcome": "right"} | {f"e_{t}": v for t, v in e.items()}
+        row = {"n": n, "steps": n, "h": 1 / n, "k": 1 / n, "outcome": "completed"} | {f"e_{t}": v for t, v in e.items()}
         row |= dict.fromkeys(
             ("norm_u_V", "norm_u_L2", "norm_w_L2", "norm_theta_L2", "normal_force", "mises_L2"), larger
         )
         row |= {"safeguarded_steps": 0, "refinements": 9 if n > 64 else 0}
-        rows.append(row | {f"identity_{i}": 1e-15 for i in BALANCES})
+        rows.append(row | {f"residual_{i}": 1e-15 for i in BALANCES})
     return rows
 
 
@@ -112,7 +115,7 @@ def test_table_of_orders(tmp_path: Path) -> None:
     assert math.isnan(own[0]["observed"])
     assert [r["observed"] for r in own[1:]] == pytest.approx([1.10, 1.22, 1.58], abs=0.005)
     assert [r["corrected"] for r in own[1:]] == pytest.approx([1.0] * 3, abs=1e-9)
-    assert {r["entitled"] for r in own} == {1.0}
+    assert {r["expected"] for r in own} == {1.0}
     assert all(math.isnan(r["corrected"]) for r in found if r["term"] in SUMS)
     few = write(tmp_path / "few_0_staggered.csv", [*rows[:2], study_rows()[-1]])
     with pytest.raises(
@@ -126,7 +129,7 @@ def test_orders_of_a_mesh_file(tmp_path: Path) -> None:
     scene = warmslip.load("plate_with_hole").override(**{"time.steps": 2})
     rows = refinement_study.study(scene, levels=[1, 2, 4], reference=8)
     assert [row["steps"] for row in rows] == [2, 4, 8, 16]
-    refinement_study.write(tmp_path / "plate.csv", rows, {})
+    tables.write(tmp_path / "plate.csv", rows, {})
     found = [row for row in rates.table(tmp_path / "plate.csv", scene.resolved()) if row["term"] == "theta_L2"]
     assert [row["h"] for row in found] == [1.0, 0.5, 0.25]
     assert [row["observed"] for row in found[1:]] == [
@@ -149,11 +152,11 @@ def test_orders_of_a_mesh_file(tmp_path: Path) -> None:
 def test_entitled_orders_are_the_papers_alone(tmp_path: Path, keys: Row) -> None:
     """What holds other scenes back is not known here: no number rather than one of another problem."""
     scene = warmslip.load("paper_mixed")
-    assert rates.papers(scene.override(**{"contact.friction.coefficient": 0.5}))
-    assert not rates.papers(scene.override(**keys))
-    assert not rates.papers(warmslip.load("block_3d"))
+    assert rates.is_paper_problem(scene.override(**{"contact.friction.coefficient": 0.5}))
+    assert not rates.is_paper_problem(scene.override(**keys))
+    assert not rates.is_paper_problem(warmslip.load("block_3d"))
     path = write(tmp_path / "other_0_staggered.csv", study_rows())
-    assert all(math.isnan(r["entitled"]) for r in rates.table(path, scene.override(**keys).resolved()))
+    assert all(math.isnan(r["expected"]) for r in rates.table(path, scene.override(**keys).resolved()))
 
 
 @pytest.mark.parametrize(
@@ -211,8 +214,8 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
         return list(verdict(rows, stored)["failed"])
 
     assert spoil(outcome="contact_not_converged") == ["case runs that did not end right"]
-    assert spoil(identity_law=1e-10) == ["case law identity"]
-    assert spoil(identity_heat=math.nan) == ["case heat identity"]
+    assert spoil(residual_law=1e-10) == ["case law identity"]
+    assert spoil(residual_heat=math.nan) == ["case heat identity"]
     assert spoil(safeguarded_steps=124) == []  # of 496
     assert spoil(safeguarded_steps=125) == ["case share of safeguarded steps"]
     assert spoil(refinements=1) == ["case refined steps on h >= 1/64"]
@@ -238,9 +241,9 @@ def test_orders_have_a_band(tmp_path: Path, order: float, falls_short: bool) -> 
     rows = []
     for n in (8, 16, 32, 64):
         row = {"path": "h=k", "coupling": "staggered", "n": n, "h": 1 / n, "open": 0, "stick": 0}
-        rows.append(row | {f"e_{t}": (64 / n) ** order for t in TERMS} | {f"identity_{i}": 0.0 for i in BALANCES})
+        rows.append(row | {f"e_{t}": (64 / n) ** order for t in TERMS} | {f"residual_{i}": 0.0 for i in BALANCES})
     checks = acceptance.manufactured(write(tmp_path / "m.csv", rows), {})
-    short = {c.name for c in checks if c.name.endswith(" order") and not c.passed}
+    short = {c.case for c in checks if c.case.endswith(" order") and not c.passed}
     assert short == ({f"manufactured h=k staggered {t} order" for t in TERMS} if falls_short else set())
 
 
@@ -255,7 +258,7 @@ def test_near_is_two_sided() -> None:
 
 def test_tables_survive_the_disk(tmp_path: Path) -> None:
     row = {"n": 8, "e": 1e-300, "x": math.pi, "bad": math.nan, "far": -math.inf, "word": "right", "front": True}
-    (back,) = rates.read(write(tmp_path / "t.csv", [row]))
+    (back,) = tables.read(write(tmp_path / "t.csv", [row]))
     assert list(back) == list(row)
     assert isinstance(back["n"], int)
     np.testing.assert_equal(back, row)

@@ -127,10 +127,10 @@ def test_order_of_a_sudden_start(what: str, order: float, keys: dict[str, Any]) 
         scene = fixtures.blank(
             **THIN, **keys, time__end=k, time__steps=steps, heat__conductivity=[[1.0, 0.0], [0.0, 1.0]]
         )
-        job = fixtures.run(scene)
-        for _ in fixtures.steps(job):
+        simulation = fixtures.run(scene)
+        for _ in fixtures.steps(simulation):
             pass
-        return job
+        return simulation
 
     sizes, errors = (8e-3, 4e-3, 2e-3, 1e-3), []
     for k in sizes:
@@ -138,8 +138,8 @@ def test_order_of_a_sudden_start(what: str, order: float, keys: dict[str, Any]) 
         difference = getattr(one.stepper, field).copy()
         difference.axpy(-1.0, getattr(many.stepper, field))
         errors.append(one.discretisation.norms.l2(difference))
-    entitled = min(f["order in k"] for f in start(one.discretisation) if f.topic == f"start of {field}")
-    assert entitled == order
+    expected = min(f["order in k"] for f in start(one.discretisation) if f.topic == f"start of {field}")
+    assert expected == order
     if order < 1:
         assert least_squares(sizes, errors)[0] == pytest.approx(order, abs=0.03)
     else:

@@ -61,16 +61,16 @@ def test_staggered_limit_is_sharp(scale: float) -> None:
     assert limit == pytest.approx(2 * A / (scale * M**2 - F))
     for k in (0.97 * limit, 1.03 * limit):
         steps = 40
-        job = fixtures.run(column(-scale * M, k, steps))
-        fixtures.start(job, theta=1.0)
-        velocities = [float(fixtures.fields(job)[1][0, 1]) for _ in fixtures.steps(job)]
+        simulation = fixtures.run(column(-scale * M, k, steps))
+        fixtures.start(simulation, theta=1.0)
+        velocities = [float(fixtures.fields(simulation)[1][0, 1]) for _ in fixtures.steps(simulation)]
         factor = (velocities[-1] / velocities[0]) ** 2
         expected = 1 - k * (scale * M**2 + F) / (A + k * F)
         assert velocities[1] / velocities[0] == pytest.approx(expected, rel=1e-9)
         assert (factor < 1) == (k < limit)
-        said = find(examine(job.discretisation), "coupling, staggered step")
-        assert said.holds == ("yes" if k < limit else "no")
-        assert said["largest k"] == pytest.approx(limit)
+        message = find(examine(simulation.discretisation), "coupling, staggered step")
+        assert message.holds == ("yes" if k < limit else "no")
+        assert message["largest k"] == pytest.approx(limit)
 
 
 def test_paper_scene_with_opposite_coupling_beyond_the_limit() -> None:
@@ -90,15 +90,15 @@ def test_paper_scene_with_opposite_coupling_beyond_the_limit() -> None:
             "initial.temperature": 1.0,
         }
         scene = warmslip.load("paper_consistent").override(**values)
-        job = Simulation(scene)
-        said = find(examine(job.discretisation), "coupling, staggered step")
-        return said, [energy(job, 1.0) for _ in job.steps()]
+        simulation = Simulation(scene)
+        message = find(examine(simulation.discretisation), "coupling, staggered step")
+        return message, [energy(simulation, 1.0) for _ in simulation.steps()]
 
-    said, small = energies(15.0)
-    assert said.holds == "yes"
+    message, small = energies(15.0)
+    assert message.holds == "yes"
     assert (np.diff(small) <= 1e-12 * small[0]).all()
-    said, big = energies(60.0)
-    assert said.holds == "no"
+    message, big = energies(60.0)
+    assert message.holds == "no"
     assert big[-1] > 1e3 * big[0]
 
 
@@ -129,13 +129,13 @@ def test_coupling_energy_is_sharp(ratio: float) -> None:
         supports__temperature=["top"],
         time__coupling="monolithic",
     )
-    job = fixtures.run(scene)
-    y = fixtures.nodes(job)[:, 1]
-    fixtures.start(job, theta=np.cos(np.pi * y / 2))
-    norms = [job.discretisation.norms.l2(job.stepper.theta) for _ in fixtures.steps(job)]
-    said = find(examine(job.discretisation), "coupling, energy")
-    assert said["W"] / said["lambda_1"] == pytest.approx(ratio, rel=2e-3)
-    assert (norms[-1] > norms[0]) == (ratio > 1) == (said.holds == "no")
+    simulation = fixtures.run(scene)
+    y = fixtures.nodes(simulation)[:, 1]
+    fixtures.start(simulation, theta=np.cos(np.pi * y / 2))
+    norms = [simulation.discretisation.norms.l2(simulation.stepper.theta) for _ in fixtures.steps(simulation)]
+    message = find(examine(simulation.discretisation), "coupling, energy")
+    assert message["W"] / message["lambda_1"] == pytest.approx(ratio, rel=2e-3)
+    assert (norms[-1] > norms[0]) == (ratio > 1) == (message.holds == "no")
 
 
 def test_positive_adiabatic_stiffness_is_not_enough() -> None:
@@ -154,11 +154,11 @@ def test_positive_adiabatic_stiffness_is_not_enough() -> None:
             heat__heating={"tensor": (sign * np.array(half)).tolist()},
             supports__displacement=["top"],
         )
-        job = fixtures.run(scene)
-        y = fixtures.nodes(job)[:, 1]
-        fixtures.start(job, u=np.stack([0 * y, 0.1 * np.cos(np.pi * y / 2)], axis=1))
-        values = [energy(job, 1.0) for _ in fixtures.steps(job)]
-        return examine(job.discretisation), values[-1] / values[0]
+        simulation = fixtures.run(scene)
+        y = fixtures.nodes(simulation)[:, 1]
+        fixtures.start(simulation, u=np.stack([0 * y, 0.1 * np.cos(np.pi * y / 2)], axis=1))
+        values = [energy(simulation, 1.0) for _ in fixtures.steps(simulation)]
+        return examine(simulation.discretisation), values[-1] / values[0]
 
     found, factor = growth(1.0)
     assert find(found, "coupling, adiabatic").holds == "yes"
@@ -199,18 +199,18 @@ def test_energy_does_not_grow_within_the_bounds(seed: int) -> None:
     k = staggered_limit(a, f, scale * m, r, rate)
     k = min(k, 5.0)
     assert k > 0
-    job = Simulation(scene(scale, k, "staggered"))
-    assert find(examine(job.discretisation), "coupling, staggered step")["largest k"] >= 0.999 * k
-    fixtures.start(job, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
+    simulation = Simulation(scene(scale, k, "staggered"))
+    assert find(examine(simulation.discretisation), "coupling, staggered step")["largest k"] >= 0.999 * k
+    fixtures.start(simulation, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
     g = float(np.sqrt((scale**2 * m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
-    values = [energy(job, g), *(energy(job, g) for _ in fixtures.steps(job))]
+    values = [energy(simulation, g), *(energy(simulation, g) for _ in fixtures.steps(simulation))]
     assert (np.diff(values) <= 1e-12 * values[0]).all()
 
     small = brentq(lambda s: lagged_margin(a, f, s * m, r, rate, 0.1), 1e-6 * scale, 4 * scale)
-    job = Simulation(scene(0.999 * small, 0.1, "lagged"))
-    assert find(examine(job.discretisation), "coupling, lagged step").holds == "yes"
-    fixtures.start(job, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
+    simulation = Simulation(scene(0.999 * small, 0.1, "lagged"))
+    assert find(examine(simulation.discretisation), "coupling, lagged step").holds == "yes"
+    fixtures.start(simulation, u=0.1 * rng.standard_normal((25, 2)), theta=rng.standard_normal(25))
     g = float(np.sqrt(small**2 * (m @ np.linalg.solve(a, m)) / (r @ np.linalg.solve(a, r))))
-    values = [energy(job, g), *(energy(job, g) for _ in fixtures.steps(job))]
+    values = [energy(simulation, g), *(energy(simulation, g) for _ in fixtures.steps(simulation))]
     # the first step's old terms: k g lambda_1 |theta_0|^2 / 2 at most, w_0 = 0
     assert max(values) <= values[0] * (1 + 0.1 * rate)

@@ -81,18 +81,18 @@ def test_frozen_thresholds_contract(quadrature: str) -> None:
 
 
 def test_what_is_said() -> None:
-    def said(**keys: Any) -> tuple[str, str]:
+    def message(**keys: Any) -> tuple[str, str]:
         found = find(audit(paper(4, **keys)), "friction, one answer a step")
         return found.holds, found.meaning
 
-    holds, meaning = said()
+    holds, meaning = message()
     assert holds == "yes"
     assert "exactly one answer" in meaning
-    assert said(contact__friction__coefficient=0.0)[0] == "not needed"
-    assert said(contact__stiffness=0.0)[0] == "not needed"
-    holds, meaning = said(contact__friction__coefficient=50.0)
+    assert message(contact__friction__coefficient=0.0)[0] == "not needed"
+    assert message(contact__stiffness=0.0)[0] == "not needed"
+    holds, meaning = message(contact__friction__coefficient=50.0)
     assert holds == "no"
     assert "More than one answer" in meaning
     opposite = {"heat__heating__tensor": [[-1.0, -1.0], [-1.0, -1.0]]}
-    assert said(time__coupling="monolithic", time__steps=32)[0] == "no"
-    assert said(time__coupling="monolithic", time__steps=32, **opposite)[0] == "yes"
+    assert message(time__coupling="monolithic", time__steps=32)[0] == "no"
+    assert message(time__coupling="monolithic", time__steps=32, **opposite)[0] == "yes"

@@ -106,7 +106,7 @@ def test_time_blocks_fill_the_time() -> None:
 
 def test_uniform_blocks_are_the_plain_run() -> None:
     scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8} | HOT)
-    march = study.March(scene, make_mesh(scene), grading.time_blocks(1.0, 8, 0))
+    march = study.Member(scene, make_mesh(scene), grading.time_blocks(1.0, 8, 0))
     for _ in march.advance():
         pass
     np.testing.assert_array_equal(march.discretisation.field(march.stepper.theta), warmslip.run(scene).theta)

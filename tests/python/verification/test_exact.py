@@ -11,14 +11,14 @@ import pytest
 from scipy.integrate import trapezoid
 
 from warmslip import Loads, Scene
-from warmslip.verification.check import Line
+from warmslip.records.check import Check
 from warmslip.verification.exact import creep, fixtures, halfplane, hertz, impact, slab
 from warmslip.verification.exact.cases import CASES
 
 Mutant = Callable[[Scene, Loads], tuple[Scene, Loads]]
 
 
-def failed(lines: list[Line]) -> list[str]:
+def failed(lines: list[Check]) -> list[str]:
     return [f"{x.case}: {x.proves}: {x.observed!r} not in [{x.low!r}, {x.high!r}]" for x in lines if not x.passed]
 
 

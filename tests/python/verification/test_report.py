@@ -7,14 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from warmslip.verification import check, report, suite
-from warmslip.verification.check import Line
+from warmslip.records import check
+from warmslip.records.check import Check
+from warmslip.verification import report, suite
 
 COLUMNS = "fault,file,what,outcome,by,commit,key"
 CONTROL = "control,a.cpp,a comment,survived,nothing may notice"
 
 
-def one(observed: float = 1.0) -> Line:
+def one(observed: float = 1.0) -> Check:
     return check.near("a | case", "the answer is one", "analytic", 1.0, observed, 1e-3)
 
 

@@ -12,9 +12,9 @@ import sympy as sp
 import warmslip
 from warmslip import Scene
 from warmslip.model.materials import make_mesh
+from warmslip.records.check import Check
 from warmslip.simulation.summary import summary
 from warmslip.studies.error_norms import TERMS
-from warmslip.verification.check import Line
 from warmslip.verification.mms import manufactured, solutions, symbolic
 from warmslip.verification.mms import orders as by_order
 from warmslip.verification.mms.fields_kinked import stick_slip
@@ -22,13 +22,13 @@ from warmslip.verification.mms.fields_smooth import affine, slip, slip_by_law, s
 from warmslip.verification.mms.manufactured import derive, errors, sliding
 from warmslip.verification.mms.orders import SPACE, Family, distorted, measure, order_lines, orders
 from warmslip.verification.mms.solutions import COUPLINGS, lagged, setting
-from warmslip.verification.mms.symbolic import Description, Manufactured, T, X, Y
+from warmslip.verification.mms.symbolic import ExactFields, Manufactured, T, X, Y
 
 PAPER = warmslip.load("paper_isotropic")
 COARSE = ((8, 3), (16, 3), (32, 3))
 
 
-def red(lines: list[Line]) -> list[str]:
+def red(lines: list[Check]) -> list[str]:
     return [f"{x.case}: {x.observed} not in [{x.low}, {x.high}]" for x in lines if not x.passed]
 
 
@@ -45,8 +45,8 @@ def test_report() -> None:
 
 def inexact(scene: Scene, solution: Manufactured) -> float:
     """Largest error of a run of `scene` over the norms at its end."""
-    found, job = errors(scene, solution, mesh=distorted(scene))
-    norms = summary(job)["norms"]
+    found, simulation = errors(scene, solution, mesh=distorted(scene))
+    norms = summary(simulation)["norms"]
     return max(found[term] / norms[term] for term in TERMS)
 
 
@@ -211,8 +211,8 @@ PUSHED = -sp.Rational(1, 1000) * (1 - Y)
 COLD = sp.S.Zero * X
 
 
-def moved(along: Any, **values: Any) -> Description:
-    return Description(sp.Matrix([(1 - Y) * along, PUSHED]), COLD, **{"claim": "slip"} | values)
+def moved(along: Any, **values: Any) -> ExactFields:
+    return ExactFields(sp.Matrix([(1 - Y) * along, PUSHED]), COLD, **{"contact_state": "slip"} | values)
 
 
 @pytest.mark.parametrize(
@@ -223,9 +223,13 @@ def moved(along: Any, **values: Any) -> Description:
         (moved(sp.sin(4 * T)), {}, "the slip reverses at x"),
         (moved((X - sp.Rational(1, 3)) * T), {}, "the slip reverses at x"),
         (moved(T * X), {}, "the slip stops where it should go on"),
-        (moved(T, claim="stick", share=sp.Matrix([0, 0])), {}, "slip where they should stick"),
-        (moved(T, claim="mixed", share=sp.Matrix([sp.Rational(11, 10), 0])), {}, "lies beyond the cone"),
-        (moved(T, claim="mixed", share=sp.Matrix([-1, 0])), {}, "does not oppose the slip"),
+        (moved(T, contact_state="stick", friction_ratio=sp.Matrix([0, 0])), {}, "slip where they should stick"),
+        (
+            moved(T, contact_state="mixed", friction_ratio=sp.Matrix([sp.Rational(11, 10), 0])),
+            {},
+            "lies beyond the cone",
+        ),
+        (moved(T, contact_state="mixed", friction_ratio=sp.Matrix([-1, 0])), {}, "does not oppose the slip"),
         (slip_by_law(PAPER), {"contact.friction.coefficient": 0.21}, "the law of friction alone does not hold"),
         (replace(sliding(), theta=1 + X), {}, "theta does not vanish on 'top'"),
         (replace(moved(T), u=sp.Matrix([T, PUSHED])), {}, "u does not vanish on 'top'"),
@@ -233,7 +237,7 @@ def moved(along: Any, **values: Any) -> Description:
         (moved(T), {"contact.part": "right", "supports.temperature": ["top"]}, "touch at 'bottom'"),
     ],
 )
-def test_contradictions_are_refused(fields: Description, keys: dict[str, Any], message: str) -> None:
+def test_contradictions_are_refused(fields: ExactFields, keys: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message) as found:
         derive(PAPER.override(**keys), fields)
     assert "\n" not in str(found.value)
@@ -267,7 +271,7 @@ def test_zero_is_no_order() -> None:
 
 def test_a_body_at_rest_is_exact() -> None:
     """Nothing is warm, nothing heats: errors are zero and are said to be, in place of an order."""
-    still = replace(moved(0 * X, claim="stick", share=sp.Matrix([0, 0])), u=sp.Matrix([0 * X, PUSHED]))
+    still = replace(moved(0 * X, contact_state="stick", friction_ratio=sp.Matrix([0, 0])), u=sp.Matrix([0 * X, PUSHED]))
     scene = PAPER.override(**{"heat.heating.tensor": [[0.0, 0.0], [0.0, 0.0]]})
     lines = orders(Family("x", scene, lambda _: still, ((4, 2), (6, 2), (8, 2)), {"theta_L2": 2.0}))
     assert [(x.observed, x.passed) for x in lines] == [(0.0, True)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import gammaln
 
-from warmslip.verification.check import Line
+from warmslip.records.check import Check
 from warmslip.verification.theory import error_bound, existence, fixed_point
 
 LEVELS = (8, 16, 32)
@@ -17,11 +17,11 @@ COARSE = (8, 12, 16)  # for mutants: enough, see `sound`
 N, STEPS = 6, 8
 
 
-def red(lines: list[Line]) -> list[str]:
+def red(lines: list[Check]) -> list[str]:
     return [f"{x.case}: {x.observed} not in [{x.low}, {x.high}]" for x in lines if not x.passed]
 
 
-def red_names(lines: list[Line]) -> set[str]:
+def red_names(lines: list[Check]) -> set[str]:
     return {x.case.split(", ")[-1] for x in lines if not x.passed}
 
 

@@ -34,8 +34,8 @@ def trace_constants(d: Discretisation) -> tuple[float, float]:
     )
     forms = discretise(unit, comm=MPI.COMM_SELF, mesh=d.mesh).operators
     boundary = sparse(forms.exchange)
-    c_1 = _largest(sp.kron(boundary, sp.identity(d.dim)), sparse(forms.elasticity), forms.clamped)
-    c_3 = _largest(boundary, sparse(forms.conductivity), forms.cooled)
+    c_1 = _largest(sp.kron(boundary, sp.identity(d.dim)), sparse(forms.elasticity), forms.prescribed_displacement)
+    c_3 = _largest(boundary, sparse(forms.conductivity), forms.prescribed_temperature)
     return float(np.sqrt(c_1)), float(np.sqrt(c_3))
 
 
@@ -45,7 +45,7 @@ def decay_rate(d: Discretisation) -> float:
     flow, mass = sparse(forms.conductivity), sparse(forms.mass)
     if forms.exchange is not None:
         flow = flow + sparse(forms.exchange)
-    free = _free(flow.shape[0], forms.cooled)
+    free = _free(flow.shape[0], forms.prescribed_temperature)
     flow, mass = flow[free][:, free], mass[free][:, free]
     if len(free) == 0:
         return float("inf")

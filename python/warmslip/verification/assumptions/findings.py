@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -11,6 +10,8 @@ from typing import Any, Literal
 
 from rich.markup import escape
 from rich.table import Table
+
+from warmslip.records import tables
 
 Holds = Literal["yes", "no", "not needed"]
 STYLE: dict[Holds, str] = {"yes": "green", "no": "red", "not needed": "dim"}
@@ -70,13 +71,8 @@ def write(path: Path, findings: Sequence[Finding], stamp: dict[str, Any]) -> Non
         rows = [asdict(one) | {"values": {k: _plain(v) for k, v in one.values}} for one in findings]
         path.write_text(json.dumps({"findings": rows, "stamp": stamp}, indent=2, allow_nan=False) + "\n")
         return
-    with path.open("w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(asdict(findings[0]))
-        for one in findings:
-            values = "; ".join(f"{name} = {value:.17g}" for name, value in one.values)
-            out.writerow((asdict(one) | {"values": values}).values())
-    path.with_suffix(".json").write_text(json.dumps(stamp, indent=2) + "\n")
+    joined = ["; ".join(f"{name} = {value:.17g}" for name, value in one.values) for one in findings]
+    tables.write(path, (asdict(one) | {"values": text} for one, text in zip(findings, joined, strict=True)), stamp)
 
 
 def _plain(value: float) -> float | str:

@@ -47,18 +47,18 @@ def start(d: Discretisation) -> Iterator[Finding]:
 def _fit(statement: str, field: str, miss: float, left: float, *, needed: bool, order: float | None = None) -> Finding:
     """`left` is the order a miss leaves by diffusion, `order` what is said in its place."""
     topic, fits = f"start of {field}", miss <= FIT
-    entitled = SMOOTH if fits or not needed else left if order is None else order
-    values = (("mismatch", miss), ("order in k", entitled))
+    expected = SMOOTH if fits or not needed else left if order is None else order
+    values = (("mismatch", miss), ("order in k", expected))
     if fits:
         return Finding(topic, statement, values, "yes", "Nothing here holds back the first order in k.")
     if not needed:
         meaning = "It does not fit, but this field has no boundary layer in time here: no conduction, or no inertia."
         return Finding(topic, statement, values, "not needed", meaning)
-    if np.isnan(entitled):
+    if np.isnan(expected):
         meaning = "It does not fit, and without viscosity the jump travels: expect clearly less than first order; none is proved."
     else:
         meaning = (
-            f"A sudden start: the largest L2 error of {field} over time is O(k^{entitled:g}), made by the first steps. Shorter "
+            f"A sudden start: the largest L2 error of {field} over time is O(k^{expected:g}), made by the first steps. Shorter "
             "first steps, or data that rise from a fit, restore the first order; at a fixed later time it is O(k)."
         )
     return Finding(topic, statement, values, "no", meaning)

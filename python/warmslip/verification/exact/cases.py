@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from warmslip.verification.check import Line
+from warmslip.records.check import Check
 from warmslip.verification.exact import creep, expansion, hertz, impact, modes, patch, ringing, shear, slab, sliding
 
-Case = Callable[[], list[Line]]
+Case = Callable[[], list[Check]]
 
 CASES: dict[str, Case] = {
     "creeping column": creep.creeping_column,
@@ -30,7 +30,7 @@ CASES: dict[str, Case] = {
 }
 
 
-def lines() -> Iterator[Line]:
+def lines() -> Iterator[Check]:
     """The lines of all cases, as they are computed; about ten seconds on one core, on one rank."""
     for case in CASES.values():
         yield from case()

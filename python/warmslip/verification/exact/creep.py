@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below, near, order
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, near, order
 from warmslip.verification.exact import fixtures
 
 # a column of length H is pulled down by TRACTION
@@ -68,18 +68,18 @@ def _creep(steps: int, coupling: str = "staggered") -> Creep:
         contact__stiffness=STIFFNESS,
     )
     loads = Loads(contact_traction=np.array([0.0, -TRACTION]), gap=GAP)
-    job = fixtures.run(scene, loads, fixtures.distorted((3, 5), (1.0, H)))
-    y, bottom = fixtures.nodes(job)[:, 1], fixtures.on(job, "bottom")
+    simulation = fixtures.run(scene, loads, fixtures.distorted((3, 5), (1.0, H)))
+    y, bottom = fixtures.nodes(simulation)[:, 1], fixtures.on(simulation, "bottom")
     rows, bent = [], 0.0
-    for report in fixtures.steps(job):
-        u, _, theta = fixtures.fields(job)
+    for report in fixtures.steps(simulation):
+        u, _, theta = fixtures.fields(simulation)
         a = -u[bottom, 1].mean() / H
         bent = max(bent, fixtures.worst(u, np.stack([0 * y, a * (y - H)], axis=1)))
-        rows.append((a, report.normal_force, fixtures.mean(job, theta)))
+        rows.append((a, report.normal_force, fixtures.mean(simulation, theta)))
     return Creep(bent, *np.array(rows).T)
 
 
-def _recursion() -> list[Line]:
+def _recursion() -> list[Check]:
     """The steps themselves: affine, backward Euler's, and heated by the velocity of the right step."""
     steps = 40
     staggered, lagged = _creep(steps), _creep(steps, "lagged")
@@ -96,7 +96,7 @@ def _recursion() -> list[Line]:
     return [below("creeping column, 40 steps", name, "analytic", e, fixtures.ROUND_OFF) for name, e in errors.items()]
 
 
-def creeping_column() -> list[Line]:
+def creeping_column() -> list[Check]:
     """Massless Kelvin-Voigt column onto the normal-compliance spring: backward Euler's recursion, and its limit."""
     counts = [40, 80, 160]
     runs = [_creep(steps).elongation for steps in counts]

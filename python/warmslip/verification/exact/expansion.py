@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below, near
 from warmslip.simulation.simulation import Simulation
-from warmslip.verification.check import Line, below, near
 from warmslip.verification.exact import fixtures
 
 E, M, THETA, HEIGHT, WIDTH, GAP = 2.0, 0.5, 3.0, 1.5, 1.0, 0.4
@@ -36,16 +36,16 @@ def _column(stiffness: float, gap: float, pull: float) -> Simulation:
         contact__stiffness=stiffness,
     )
     loads = Loads(source=1.0, gap=gap, contact_traction=np.array([0.0, -pull]))
-    job = fixtures.run(scene, loads, fixtures.distorted((4, 5), (WIDTH, HEIGHT)))
-    fixtures.start(job, theta=THETA)
-    return job
+    simulation = fixtures.run(scene, loads, fixtures.distorted((4, 5), (WIDTH, HEIGHT)))
+    fixtures.start(simulation, theta=THETA)
+    return simulation
 
 
-def _pressed(stiffness: float) -> list[Line]:
-    job = _column(stiffness, GAP, 0.0)
+def _pressed(stiffness: float) -> list[Check]:
+    simulation = _column(stiffness, GAP, 0.0)
     name, exact, p = f"heated column, c_nu = {stiffness:.0e}", pressure(stiffness) * WIDTH, pressure(stiffness)
-    forces = [report.normal_force for report in fixtures.steps(job)]
-    moved = -np.asarray(job.stepper.contact_displacement).reshape(-1, 2)[:, 1]
+    forces = [report.normal_force for report in fixtures.steps(simulation)]
+    moved = -np.asarray(simulation.stepper.contact_displacement).reshape(-1, 2)[:, 1]
     return [
         near(name, "the force is exact", "analytic", exact, forces[0], fixtures.ROUND_OFF),
         below(
@@ -58,13 +58,13 @@ def _pressed(stiffness: float) -> list[Line]:
     ]
 
 
-def heated_column() -> list[Line]:
+def heated_column() -> list[Check]:
     """The force of a uniform temperature against the foundation, soft and stiff: the pressure is an unknown."""
     lines = [line for stiffness in STIFFNESSES for line in _pressed(stiffness)]
     strain = (M * THETA + PULL) / E
-    job = _column(1e4, strain * HEIGHT + 0.1, PULL)
-    free = [report.normal_force for report in fixtures.steps(job)]
-    growth = fixtures.worst(fixtures.fields(job)[0][:, 1], strain * (fixtures.nodes(job)[:, 1] - HEIGHT))
+    simulation = _column(1e4, strain * HEIGHT + 0.1, PULL)
+    free = [report.normal_force for report in fixtures.steps(simulation)]
+    growth = fixtures.worst(fixtures.fields(simulation)[0][:, 1], strain * (fixtures.nodes(simulation)[:, 1] - HEIGHT))
     name = "heated column, wide gap"
     return [
         *lines,

@@ -45,7 +45,7 @@ def blank(**keys: Any) -> FullScene:
 
 
 def distorted(counts: tuple[int, int], lengths: tuple[float, float], *, seed: int = 1) -> Triangulation:
-    """A rectangle of crossed bricks whose nodes are moved by up to a quarter of a brick, along the sides on the boundary."""
+    """A rectangle of crossed cells whose nodes are moved by up to a quarter of a grid cell, along the sides on the boundary."""
     x, y = (np.linspace(0.0, length, n + 1) for n, length in zip(counts, lengths, strict=True))
     return jiggled(crossed(x, y), 0.2 * np.array([x[1], y[1]]), seed)
 
@@ -59,7 +59,7 @@ def jiggled(mesh: Triangulation, amount: Array, seed: int) -> Triangulation:
 
 
 def crossed(x: Array, y: Array) -> Triangulation:
-    """The rectangle with grid lines `x` and `y`, every brick cut by both diagonals: mirror images have mirrored meshes."""
+    """The rectangle with grid lines `x` and `y`, every grid cell cut by both diagonals: mirror images have mirrored meshes."""
     columns, rows = len(x), len(y)
     corner = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
     grid = np.stack(np.meshgrid(x, y), axis=-1)
@@ -77,43 +77,45 @@ def run(scene: FullScene, loads: Loads | None = None, mesh: Triangulation | None
     return Simulation(scene, discretisation=discretise(scene, loads=loads, mesh=None if mesh is None else mesh.mesh()))
 
 
-def steps(job: Simulation) -> Iterator[Any]:
+def steps(simulation: Simulation) -> Iterator[Any]:
     """A report a step. Raises RuntimeError when a step is not right: a closed form has nothing to say about it."""
-    yield from (report for _, report in job.steps())
-    if job.outcome != "right":
-        raise RuntimeError(f"the run ended: {job.outcome}, {job.failure}")
+    yield from (report for _, report in simulation.steps())
+    if simulation.outcome != "completed":
+        raise RuntimeError(f"the run ended: {simulation.outcome}, {simulation.failure}")
 
 
-def nodes(job: Simulation) -> Array:
+def nodes(simulation: Simulation) -> Array:
     """Positions of the nodes, (nodes, 2)."""
-    return np.asarray(job.discretisation.mesh.nodes)
+    return np.asarray(simulation.discretisation.mesh.nodes)
 
 
-def fields(job: Simulation) -> tuple[Array, Array, Array]:
+def fields(simulation: Simulation) -> tuple[Array, Array, Array]:
     """u, w (nodes, 2) and theta (nodes,) of the present state."""
-    d, s = job.discretisation, job.stepper
+    d, s = simulation.discretisation, simulation.stepper
     return d.field(s.u), d.field(s.w), d.field(s.theta)
 
 
-def start(job: Simulation, *, u: Array | float = 0.0, w: Array | float = 0.0, theta: Array | float = 0.0) -> None:
+def start(
+    simulation: Simulation, *, u: Array | float = 0.0, w: Array | float = 0.0, theta: Array | float = 0.0
+) -> None:
     """Sets the initial state; values broadcast to (nodes, 2), (nodes, 2) and (nodes,)."""
-    n = len(nodes(job))
+    n = len(nodes(simulation))
     displacement, velocity = (np.array(np.broadcast_to(v, (n, 2)), dtype=float) for v in (u, w))
     temperature = np.array(np.broadcast_to(theta, (n,)), dtype=float)
-    job.discretisation.restart(job.stepper, displacement, velocity, temperature, 0.0)
+    simulation.discretisation.restart(simulation.stepper, displacement, velocity, temperature, 0.0)
 
 
-def mean(job: Simulation, field: Array) -> Array:
+def mean(simulation: Simulation, field: Array) -> Array:
     """Mean over the body of a P1 field (nodes, ...), exactly."""
-    cells = np.asarray(job.discretisation.mesh.cells)
-    x = nodes(job)[cells]
+    cells = np.asarray(simulation.discretisation.mesh.cells)
+    x = nodes(simulation)[cells]
     area = np.abs(np.linalg.det(x[:, 1:] - x[:, :1]))
     return np.asarray(np.tensordot(area, field[cells].mean(axis=1), axes=1) / area.sum())
 
 
-def on(job: Simulation, part: str) -> Any:
+def on(simulation: Simulation, part: str) -> Any:
     """Numbers of the nodes on a boundary part."""
-    return np.unique(job.discretisation.mesh.parts[part])
+    return np.unique(simulation.discretisation.mesh.parts[part])
 
 
 def worst(a: Array, b: Array | float, scale: float | None = None) -> float:

@@ -26,11 +26,11 @@ POINTS = 200  # of the midpoint rule on an edge: enough for a square root at its
 
 @dataclass(frozen=True)
 class HalfPlane:
-    """An elastic half-plane with Lame's (lam, SHEAR_MODULUS), cut off at `size`, bricks of 1/`bricks` under the contact."""
+    """An elastic half-plane with Lame's (lam, SHEAR_MODULUS), cut off at `size`, cells of 1/`cells` under the contact."""
 
     lam: float
     size: float
-    bricks: int
+    cells: int
     stiffness: float
     friction: float = 0.0
 
@@ -51,11 +51,11 @@ class HalfPlane:
         return float(np.pi * self.modulus / (4 * FORCE))
 
     def mesh(self) -> Triangulation:
-        """Uniform up to |x| = 1.25 and y = 1, from there in geometric progression; each doubling of `bricks` halves all."""
-        x, y = (_lines(start, self.size, self.bricks) for start in (1.25, 1.0))
+        """Uniform up to |x| = 1.25 and y = 1, from there in geometric progression; each doubling of `cells` halves all."""
+        x, y = (_lines(start, self.size, self.cells) for start in (1.25, 1.0))
         return fixtures.crossed(np.concatenate([-x[:0:-1], x]), y)
 
-    def job(self, steps: int, shear: Callable[[float], float]) -> Simulation:
+    def simulation(self, steps: int, shear: Callable[[float], float]) -> Simulation:
         """A run of `steps` steps under P and, at time t, the tangential load shear(t), per thickness."""
         scene = fixtures.blank(
             time__end=self.step * steps,
@@ -82,15 +82,15 @@ class HalfPlane:
         return fixtures.run(scene, loads, self.mesh())
 
 
-def _lines(uniform: float, size: float, bricks: int) -> Array:
-    """0 .. size: quarters up to `uniform`, then growing by half each, the last one cut; every part halved up to `bricks`."""
+def _lines(uniform: float, size: float, cells: int) -> Array:
+    """0 .. size: quarters up to `uniform`, then growing by half each, the last one cut; every part halved up to `cells`."""
     x, step = list(np.arange(0, uniform + 0.1, 0.25)), 0.25
     while x[-1] < size:
         step *= 1.5
         x.append(x[-1] + step)
     coarse = np.array(x)
     coarse[coarse > uniform] = uniform + (coarse[coarse > uniform] - uniform) * (size - uniform) / (x[-1] - uniform)
-    parts = bricks // 4
+    parts = cells // 4
     return np.interp(np.arange((len(coarse) - 1) * parts + 1) / parts, np.arange(len(coarse)), coarse)
 
 
@@ -105,12 +105,12 @@ class Foot:
     weight: Array
 
     @classmethod
-    def of(cls, job: Simulation) -> Foot:
-        surface = job.discretisation.surface
+    def of(cls, simulation: Simulation) -> Foot:
+        surface = simulation.discretisation.surface
         x, weight = np.asarray(surface.positions)[:, 0], np.asarray(surface.weights)
         order = np.argsort(x)
-        force = np.asarray(job.stepper.contact_force).reshape(-1, 2) / weight[:, None]
-        status = np.array(job.stepper.status)
+        force = np.asarray(simulation.stepper.contact_force).reshape(-1, 2) / weight[:, None]
+        status = np.array(simulation.stepper.status)
         return cls(x[order], -force[order, 1], force[order, 0], status[order], weight[order])
 
     def average(self, traction: Callable[[Array], Array]) -> Array:

@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
+from warmslip.records.check import Check, Origin, below, near, order
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, Origin, below, near, order
 from warmslip.verification.exact import fixtures
 from warmslip.verification.exact.halfplane import FORCE, PEAK, Foot, HalfPlane
 
@@ -27,11 +27,11 @@ def _width(x: Array, traction: Array, weight: Array) -> float:
 
 def _pressed(body: HalfPlane) -> tuple[Foot, Array, float]:
     """The foot under P at rest, u (nodes, 2), and the largest velocity that is left, of what falls by a in a step."""
-    job = body.job(SETTLE, lambda t: 0.0)
-    for _ in fixtures.steps(job):
+    simulation = body.simulation(SETTLE, lambda t: 0.0)
+    for _ in fixtures.steps(simulation):
         pass
-    u, w, _ = fixtures.fields(job)
-    return Foot.of(job), u, float(np.abs(w).max() * body.step)
+    u, w, _ = fixtures.fields(simulation)
+    return Foot.of(simulation), u, float(np.abs(w).max() * body.step)
 
 
 def _ellipse(x: Array, half: float) -> Array:
@@ -43,14 +43,14 @@ def _distance(foot: Foot, traction: Array, exact: Array) -> float:
     return float(np.sqrt(foot.weight @ (traction - exact) ** 2 / (foot.weight @ exact**2)))
 
 
-def hertz() -> list[Line]:
+def hertz() -> list[Check]:
     """a = sqrt(4 P R/(pi E*)), p_0 = 2 P/(pi a): what the mesh, the size of the block and the compliance cost."""
     lines, misses = [], {}
-    for bricks, size, band in ((4, 8.0, 1e-2), (8, 8.0, 5e-3), (16, 4.0, 5e-3), (16, 8.0, 1e-3)):
-        foot, moving = _pressed(HalfPlane(1.0, size, bricks, STIFF))[::2]
+    for cells, size, band in ((4, 8.0, 1e-2), (8, 8.0, 5e-3), (16, 4.0, 5e-3), (16, 8.0, 1e-3)):
+        foot, moving = _pressed(HalfPlane(1.0, size, cells, STIFF))[::2]
         miss = _distance(foot, foot.pressure, PEAK * foot.average(lambda x: _ellipse(x, 1.0)))
-        misses[bricks, size] = miss
-        name = f"Hertz, a/h = {bricks}, L/a = {size:g}"
+        misses[cells, size] = miss
+        name = f"Hertz, a/h = {cells}, L/a = {size:g}"
         lines += [
             near(name, "half-width", "analytic", 1.0, _width(foot.x, foot.pressure, foot.weight), band),
             near(name, "peak pressure", "analytic", PEAK, float(foot.pressure.max()), band),
@@ -90,7 +90,7 @@ def winkler(body: HalfPlane, cells: int = 300, half: float = 1.5) -> tuple[Array
     return x, pressure
 
 
-def compliant() -> list[Line]:
+def compliant() -> list[Check]:
     """A foundation as soft as the body: Hertz is wrong by a tenth, the half-plane's integral equation is not."""
     body = HalfPlane(1.0, 8.0, 16, stiffness=10.0)
     x, exact = winkler(body)
@@ -108,7 +108,7 @@ def compliant() -> list[Line]:
             fixtures.worst(foot.pressure, np.interp(foot.x, x, exact), peak),
             5e-3,
         ),
-        Line(
+        Check(
             name,
             "the compliance is felt: Hertz's peak is missed",
             how,
@@ -124,37 +124,37 @@ def _partial_slip(c: float, x: Array) -> Array:
     return _ellipse(x, 1.0) - _ellipse(x, c)
 
 
-def cattaneo_mindlin() -> list[Line]:
+def cattaneo_mindlin() -> list[Check]:
     """Q < mu P after P: q = mu p_0 (sqrt(1 - x^2/a^2) - c/a sqrt(1 - x^2/c^2)), stick for |x| < c = a sqrt(1 - Q/(mu P)).
 
     Friction is switched on when the block lies still, for Hertz's pressure is that without friction. The theory neglects that
     shear moves the surface up and down, mu/(lambda + 2 mu) of what it moves it along: lambda = 18 leaves 1/20, squared.
     """
     friction, steps, full, lines = 0.2, 10, 0.8, []
-    for bricks, band in ((8, 0.03), (16, 0.01)):
-        body = HalfPlane(18.0, 8.0, bricks, STIFF, friction)
-        _, u, _ = _pressed(HalfPlane(18.0, 8.0, bricks, STIFF))
+    for cells, band in ((8, 0.03), (16, 0.01)):
+        body = HalfPlane(18.0, 8.0, cells, STIFF, friction)
+        _, u, _ = _pressed(HalfPlane(18.0, 8.0, cells, STIFF))
         limit, duration = friction * FORCE, steps * body.step
 
         def load(t: float, limit: float = limit, duration: float = duration) -> float:
             return full * limit * t / duration
 
-        job = body.job(steps, load)
-        fixtures.start(job, u=u)
-        for n, _ in enumerate(fixtures.steps(job), 1):
+        simulation = body.simulation(steps, load)
+        fixtures.start(simulation, u=u)
+        for n, _ in enumerate(fixtures.steps(simulation), 1):
             if n not in (6, 8, 10):
                 continue
-            foot, q = Foot.of(job), load(job.stepper.time)
+            foot, q = Foot.of(simulation), load(simulation.stepper.time)
             c = float(np.sqrt(1 - q / limit))
             short = friction * foot.pressure - foot.shear
             exact = foot.average(partial(_partial_slip, c))
             miss = _distance(foot, foot.shear, friction * PEAK * exact)
             stuck = float(np.abs(foot.x[foot.status == 1]).max())
-            name = f"Cattaneo-Mindlin, a/h = {bricks}, Q = {q / limit:.2f} mu P"
+            name = f"Cattaneo-Mindlin, a/h = {cells}, Q = {q / limit:.2f} mu P"
             lines += [
                 near(name, "stick half-width, by moments", "analytic", c, _width(foot.x, short, foot.weight), band),
-                Line(name, "the last point that sticks", "analytic", c, stuck, c - 1.5 / bricks, c + 0.5 / bricks),
-                below(name, "shear traction, relative in L2", "analytic", miss, 0.8 / bricks),
+                Check(name, "the last point that sticks", "analytic", c, stuck, c - 1.5 / cells, c + 0.5 / cells),
+                below(name, "shear traction, relative in L2", "analytic", miss, 0.8 / cells),
                 near(name, "friction carries Q", "analytic", q, float(foot.weight @ foot.shear), 3e-3),
             ]
     return lines

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from warmslip.records.check import Check, below, near, order
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, near, order
 from warmslip.verification.exact import fixtures
 
 LENGTH, WIDTH, E, DENSITY, SPEED = 1.0, 0.125, 4.0, 1.0, 0.3
@@ -63,7 +63,7 @@ class Impact:
 
 
 def _fly(n: int, steps: int, stiffness: float, end: float) -> tuple[Array, Array]:
-    """Normal forces per width and mean velocities along y, (steps,) each; n bricks along the bar."""
+    """Normal forces per width and mean velocities along y, (steps,) each; n cells along the bar."""
     scene = fixtures.blank(
         time__end=end,
         time__steps=steps,
@@ -71,10 +71,11 @@ def _fly(n: int, steps: int, stiffness: float, end: float) -> tuple[Array, Array
         elasticity__lame=[0.0, E / 2],
         contact__stiffness=stiffness,
     )
-    job = fixtures.run(scene, mesh=fixtures.crossed(np.array([0.0, WIDTH]), np.linspace(0, LENGTH, n + 1)))
-    fixtures.start(job, w=np.array([0.0, -SPEED]))
+    simulation = fixtures.run(scene, mesh=fixtures.crossed(np.array([0.0, WIDTH]), np.linspace(0, LENGTH, n + 1)))
+    fixtures.start(simulation, w=np.array([0.0, -SPEED]))
     rows = [
-        (report.normal_force / WIDTH, fixtures.mean(job, fixtures.fields(job)[1])[1]) for report in fixtures.steps(job)
+        (report.normal_force / WIDTH, fixtures.mean(simulation, fixtures.fields(simulation)[1])[1])
+        for report in fixtures.steps(simulation)
     ]
     force, velocity = np.array(rows).T
     return force, velocity
@@ -83,7 +84,7 @@ def _fly(n: int, steps: int, stiffness: float, end: float) -> tuple[Array, Array
 END = 1.25 * TRANSIT  # beyond `touch` for both stiffnesses; the bar does not come back
 
 
-def soft_impact() -> list[Line]:
+def soft_impact() -> list[Check]:
     """A foundation soft enough (c_nu L/E = 5) for the pressure to have no jump: everything is O(k)."""
     exact, counts = Impact(20.0), [200, 400, 800]
     runs = [_fly(64, steps, exact.stiffness, END) for steps in counts]
@@ -116,7 +117,7 @@ def soft_impact() -> list[Line]:
     ]
 
 
-def stiff_impact() -> list[Line]:
+def stiff_impact() -> list[Check]:
     """A foundation that acts as rigid: rho c V for the time 2 L/c; backward Euler blurs the front over sqrt(k).
 
     With D = (1 - 1/z)/k for d/dt, a delay T turns into exp(-D T): a front arrives after k N, N of Poisson's law with mean T/k.

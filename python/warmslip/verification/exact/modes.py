@@ -14,10 +14,10 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import eigsh
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below, order
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, order
 from warmslip.verification.exact import fixtures
 from warmslip.verification.grading.meshes import Triangulation
 
@@ -46,13 +46,13 @@ def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Simula
     return fixtures.run(scene, Loads(gap=FAR), mesh)
 
 
-def _modes(job: Simulation, count: int) -> tuple[Array, Array]:
+def _modes(simulation: Simulation, count: int) -> tuple[Array, Array]:
     """The lowest eigenvalues omega^2 (count,) and modes (count, nodes, 2) of the clamped body, mass-normalised."""
-    d = job.discretisation
+    d = simulation.discretisation
     unit = 1 / d.full.inertia.density  # the density of the prediction is the one written above
     elastic, mass = _scipy(d.operators.elasticity), DENSITY * unit * _scipy(d.operators.inertia)
-    held = np.zeros((len(fixtures.nodes(job)), 2))
-    held[fixtures.on(job, "top")] = 1
+    held = np.zeros((len(fixtures.nodes(simulation)), 2))
+    held[fixtures.on(simulation, "top")] = 1
     vector = d.layout.vector(2)
     d.layout.distribute(held.ravel(), vector)
     free = np.flatnonzero(np.asarray(vector) == 0)
@@ -68,20 +68,20 @@ def _modes(job: Simulation, count: int) -> tuple[Array, Array]:
     return values, np.array(out)
 
 
-def recursion() -> list[Line]:
+def recursion() -> list[Check]:
     """Three modes of a distorted body at once, each with its own amplitude and velocity, for 50 steps."""
     k, steps = 0.05, 50
-    job = _job(fixtures.distorted((4, 6), (1.0, 1.5)), LAME, k, steps)
-    squares, modes = _modes(job, 3)
+    simulation = _job(fixtures.distorted((4, 6), (1.0, 1.5)), LAME, k, steps)
+    squares, modes = _modes(simulation, 3)
     a, b = np.array([0.3, -0.2, 0.1]), np.array([0.5, 0.4, -0.6])
-    fixtures.start(job, u=np.tensordot(a, modes, 1), w=np.tensordot(b, modes, 1))
+    fixtures.start(simulation, u=np.tensordot(a, modes, 1), w=np.tensordot(b, modes, 1))
     scale = float(np.abs(np.tensordot(a, modes, 1)).max())
     speed = float(np.abs(np.tensordot(b, modes, 1)).max())
     wrong = {"u": 0.0, "w": 0.0}
-    for _ in fixtures.steps(job):
+    for _ in fixtures.steps(simulation):
         b = (b - k * squares * a) / (1 + k * DAMPING * squares + k * k * squares)
         a = a + k * b
-        u, w, _ = fixtures.fields(job)
+        u, w, _ = fixtures.fields(simulation)
         wrong["u"] = max(wrong["u"], fixtures.worst(u, np.tensordot(a, modes, 1), scale))
         wrong["w"] = max(wrong["w"], fixtures.worst(w, np.tensordot(b, modes, 1), speed))
     name = "three modes, 50 steps"
@@ -97,23 +97,23 @@ def recursion() -> list[Line]:
     ]
 
 
-def frequency() -> list[Line]:
+def frequency() -> list[Check]:
     """Longitudinal modes of a bar: omega = (pi/2) sqrt(2 mu/rho)/H for lambda = 0; P1's lie above by (omega h/c)^2/12."""
     height, lame = 1.0, [0.0, 2.0]
     exact = (np.pi / 2 / height) ** 2 * 2 * lame[1] / DENSITY
     levels, excess = [4, 8, 16], []
     for n in levels:
         mesh = fixtures.crossed(np.linspace(0, height / 2, n // 2 + 1), np.linspace(0, height, n + 1))
-        job = _job(mesh, lame, 1.0, 1)
-        squares, modes = _modes(job, 4)
+        simulation = _job(mesh, lame, 1.0, 1)
+        squares, modes = _modes(simulation, 4)
         # the bar bends too: the longitudinal mode is the one whose mean moves along y
-        along = np.abs([fixtures.mean(job, mode)[1] for mode in modes])
+        along = np.abs([fixtures.mean(simulation, mode)[1] for mode in modes])
         excess.append(float(squares[along.argmax()]) / exact - 1)
     p, _ = least_squares([1 / n for n in levels], excess)
     name = f"longitudinal mode, n = {levels[-1]}"
-    # the nodes in the middle of the bricks lower the excess of P1 on the bricks' heights, and cannot make it negative
+    # the nodes in the middle of the cells lower the excess of P1 on the cells' heights, and cannot make it negative
     most = (np.pi / 2 / levels[-1]) ** 2 / 12
     return [
         order(name, "omega^2 is O(h^2) too large", "analytic", 2.0, p),
-        Line(name, "the excess is at most P1's on bricks, positive", "analytic", most, excess[-1], 0.0, most),
+        Check(name, "the excess is at most P1's on cells, positive", "analytic", most, excess[-1], 0.0, most),
     ]

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below
 from warmslip.scene.full import FullScene
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below
 from warmslip.verification.exact import fixtures
 
 COUNTS, LENGTHS = (5, 3), (2.0, 1.0)
@@ -54,7 +54,7 @@ def gradient(strain: Array) -> Array:
     return np.array([[strain[0, 0], 2 * strain[0, 1]], [0.0, strain[1, 1]]])
 
 
-def _coupled(coupling: str) -> list[Line]:
+def _coupled(coupling: str) -> list[Check]:
     k, steps = 0.1, 5
     scene = material(
         time__end=k * steps,
@@ -98,14 +98,14 @@ def _coupled(coupling: str) -> list[Line]:
         gap=lambda x, t: 0.02 + 0.01 * t + stress(t)[1, 1] / STIFFNESS + 0 * x[:, 0],  # u_nu + sigma_yy/c_nu
         foundation_temperature=lambda x, t: theta(t) + 0 * x[:, 0],
     )
-    job = fixtures.run(scene, loads, fixtures.distorted(COUNTS, LENGTHS))
-    x = fixtures.nodes(job)
-    fixtures.start(job, u=u(x, 0.0), w=w(x), theta=THETA0)
+    simulation = fixtures.run(scene, loads, fixtures.distorted(COUNTS, LENGTHS))
+    x = fixtures.nodes(simulation)
+    fixtures.start(simulation, u=u(x, 0.0), w=w(x), theta=THETA0)
     found = dict.fromkeys(("u", "w", "theta", "the resultant"), 0.0)
-    for report in fixtures.steps(job):
-        t = job.stepper.time
+    for report in fixtures.steps(simulation):
+        t = simulation.stepper.time
         expected = u(x, t), w(x), np.full(len(x), theta(t)), WIDTH * stress(t) @ [0.0, -1.0]
-        values = *fixtures.fields(job), np.ravel(report.traction)
+        values = *fixtures.fields(simulation), np.ravel(report.traction)
         for name, value, exact in zip(found, values, expected, strict=True):
             found[name] = max(found[name], fixtures.worst(value, exact))
     name = f"coupled uniform strain, {coupling}"
@@ -115,7 +115,7 @@ def _coupled(coupling: str) -> list[Line]:
     ]
 
 
-def coupled_patch() -> list[Line]:
+def coupled_patch() -> list[Check]:
     """u affine and linear in time, theta uniform: theta' = q0 + R : eps(w), sigma uniform, full slip by the law itself.
 
     The shear strain is chosen so that sigma_xy = -mu sigma_yy at all times, the gap so that c_nu (u_nu - g) = -sigma_yy;

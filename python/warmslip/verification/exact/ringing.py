@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from warmslip.records.check import Check, near, order
 from warmslip.studies.error_norms import ExactErrors
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, near, order
 from warmslip.verification.exact import fixtures
 
 # overdamped, so that the exact mode is real; s is a root of rho s^2 + (E + eta s) KAPPA^2 = 0
@@ -18,7 +18,7 @@ REST = SPRING * OVERLAP / (MODULUS + SPRING)  # compression of the column that t
 
 
 def _inertial_errors(n: int, steps: int) -> dict[str, float]:
-    """Errors at the end on bricks of size 1/n, of u in |eps|_L2 and of w in L2."""
+    """Errors at the end on cells of size 1/n, of u in |eps|_L2 and of w in L2."""
     scene = fixtures.blank(
         mesh__n=[n // 4, n],
         mesh__lengths=[0.25, 1.0],
@@ -43,21 +43,21 @@ def _inertial_errors(n: int, steps: int) -> dict[str, float]:
         out[:, 1, 1] = -REST - AMPLITUDE * KAPPA * np.exp(DECAY * t) * np.cos(KAPPA * (1 - x[:, 1]))
         return out
 
-    job = fixtures.run(scene)
-    x = fixtures.nodes(job)
-    fixtures.start(job, u=up(REST * (1 - x[:, 1]) + mode(x, 0.0)), w=up(DECAY * mode(x, 0.0)))
-    for _ in fixtures.steps(job):
+    simulation = fixtures.run(scene)
+    x = fixtures.nodes(simulation)
+    fixtures.start(simulation, u=up(REST * (1 - x[:, 1]) + mode(x, 0.0)), w=up(DECAY * mode(x, 0.0)))
+    for _ in fixtures.steps(simulation):
         pass
     measure = ExactErrors(
-        job.discretisation,
+        simulation.discretisation,
         w=lambda x, t: up(DECAY * mode(x, t)),
         theta=lambda x, t: np.zeros(len(x)),
         gradient=gradient,
     )
-    return measure.of(job.stepper)
+    return measure.of(simulation.stepper)
 
 
-def inertial_column() -> list[Line]:
+def inertial_column() -> list[Check]:
     """A Kelvin-Voigt column with inertia that rings down on the spring: u_y = REST (1 - y) + A e^(st) sin(KAPPA (1 - y)).
 
     It solves rho u'' = E u_yy + eta w_yy with u(1) = 0 and sigma(0) = c_nu (u(0) - OVERLAP) for every t.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below, near
 from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, near
 from warmslip.verification.exact import fixtures
 from warmslip.verification.exact.patch import (
     COUNTS,
@@ -52,24 +52,24 @@ def _pressed(
         body=np.array([body, 0.0]),
         traction=pulls | {"top": above},
     )
-    job = fixtures.run(scene, loads, fixtures.distorted(COUNTS, LENGTHS))
-    x = fixtures.nodes(job)
-    fixtures.start(job, u=np.array([0.0, -PRESSURE / STIFFNESS]) + x @ g0.T, w=x @ g1.T)
-    return job, g0, g1
+    simulation = fixtures.run(scene, loads, fixtures.distorted(COUNTS, LENGTHS))
+    x = fixtures.nodes(simulation)
+    fixtures.start(simulation, u=np.array([0.0, -PRESSURE / STIFFNESS]) + x @ g0.T, w=x @ g1.T)
+    return simulation, g0, g1
 
 
-def sticking_patch() -> list[Line]:
+def sticking_patch() -> list[Check]:
     """A shear that grows to 99.9 % of mu p: the block shears uniformly and its foot stands still."""
     scene = material()
     mu, damping = scene.elasticity.pair(2)[1], scene.viscosity.pair(2)[1]
     k, steps, limit = 0.1, 8, FRICTION * PRESSURE
     shear_rate = 0.999 * limit / (2 * mu * k * steps + 2 * damping)
-    job, g0, g1 = _pressed(steps, k, shear_rate, 0.0, 0.0, 0.0)
-    x, foot = fixtures.nodes(job), fixtures.on(job, "bottom")
+    simulation, g0, g1 = _pressed(steps, k, shear_rate, 0.0, 0.0, 0.0)
+    x, foot = fixtures.nodes(simulation), fixtures.on(simulation, "bottom")
     creep, wrong, lost, loose = 0.0, 0.0, 0.0, 0
-    for report in fixtures.steps(job):
-        t = job.stepper.time
-        u, w, _ = fixtures.fields(job)
+    for report in fixtures.steps(simulation):
+        t = simulation.stepper.time
+        u, w, _ = fixtures.fields(simulation)
         creep = max(creep, float(np.abs(w[foot, 0]).max()))
         wrong = max(wrong, fixtures.worst(u, np.array([0.0, -PRESSURE / STIFFNESS]) + x @ (g0 + t * g1).T))
         force = WIDTH * 2 * (mu * t + damping) * shear_rate
@@ -87,18 +87,18 @@ def sticking_patch() -> list[Line]:
     ]
 
 
-def slipping_patch() -> list[Line]:
+def slipping_patch() -> list[Check]:
     """A uniform shear of mu p and a body force b: slip with w_x = t b/rho, exactly backward Euler's straight line."""
     b, k, steps = 0.35, 0.1, 8
     scene = material()
     shear = FRICTION * PRESSURE / (2 * scene.elasticity.pair(2)[1])
-    job, g0, _ = _pressed(steps, k, 0.0, shear, b, 0.0)
-    x = fixtures.nodes(job)
+    simulation, g0, _ = _pressed(steps, k, 0.0, shear, b, 0.0)
+    x = fixtures.nodes(simulation)
     acceleration = b / scene.inertia.density
     errors = {"w is t (shear resultant - mu p W)/mass": 0.0, "u is the sum of k w": 0.0, "friction is mu p": 0.0}
     held = 0
-    for n, report in enumerate(fixtures.steps(job), 1):
-        u, w, _ = fixtures.fields(job)
+    for n, report in enumerate(fixtures.steps(simulation), 1):
+        u, w, _ = fixtures.fields(simulation)
         speed, way = n * k * acceleration, k * k * n * (n + 1) / 2 * acceleration
         friction = float(np.ravel(report.friction_traction)[0])
         found = (
@@ -113,7 +113,7 @@ def slipping_patch() -> list[Line]:
     return [*lines, below(name, "every point slips", "analytic", held, 0.0)]
 
 
-def threshold_patch() -> list[Line]:
+def threshold_patch() -> list[Check]:
     """A shear of mu p and 0.1 % more on the top alone: stress is not uniform, but momentum is gained exactly.
 
     m (V_n - V_(n-1)) = k (W top traction - friction); a few points stick at first, then all slip and friction is mu times the
@@ -122,15 +122,15 @@ def threshold_patch() -> list[Line]:
     excess, k, steps = 1e-3, 0.1, 8
     scene = material()
     limit = FRICTION * PRESSURE
-    job, *_ = _pressed(steps, k, 0.0, limit / (2 * scene.elasticity.pair(2)[1]), 0.0, excess * limit)
+    simulation, *_ = _pressed(steps, k, 0.0, limit / (2 * scene.elasticity.pair(2)[1]), 0.0, excess * limit)
     mass = scene.inertia.density * WIDTH * HEIGHT
     before, lost, law, sliding = 0.0, 0.0, 0.0, 0
-    for report in fixtures.steps(job):
-        speed = float(fixtures.mean(job, fixtures.fields(job)[1])[0])
+    for report in fixtures.steps(simulation):
+        speed = float(fixtures.mean(simulation, fixtures.fields(simulation)[1])[0])
         friction = -float(np.ravel(report.friction_traction)[0])
         gain = k * ((1 + excess) * limit * WIDTH - friction)
         lost = max(lost, abs(mass * (speed - before) - gain) / (k * limit * WIDTH))
-        if report.slip == len(job.discretisation.surface.weights):
+        if report.slip == len(simulation.discretisation.surface.weights):
             sliding += 1
             law = max(law, abs(friction / (FRICTION * report.normal_force) - 1))
         before = speed
@@ -139,6 +139,6 @@ def threshold_patch() -> list[Line]:
     return [
         below(name, "momentum gained is traction less friction, of mu p", "analytic", lost, fixtures.ROUND_OFF),
         below(name, "friction is mu p when all points slip", "analytic", law, fixtures.ROUND_OFF),
-        Line(name, "steps in which all points slip", "analytic", steps, sliding, 1, steps),
+        Check(name, "steps in which all points slip", "analytic", steps, sliding, 1, steps),
         near(name, "it moves off with the excess alone", "analytic", expected, before, 0.01),
     ]

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
+from warmslip.records.check import Check, below, near, order
 from warmslip.scene.full import FullScene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.error_norms import ExactErrors
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, near, order
 from warmslip.verification.exact import fixtures
 
 HEIGHT, CONDUCTIVITY, EXCHANGE, FOUNDATION, END = 1.5, 0.8, 2.0, 10.0, 0.4
@@ -60,26 +60,26 @@ def _scene(n: int, end: float, steps: int) -> FullScene:
 
 
 def _march(n: int, end: float, steps: int) -> Simulation:
-    job = fixtures.run(_scene(n, end, steps))
-    for _ in fixtures.steps(job):
+    simulation = fixtures.run(_scene(n, end, steps))
+    for _ in fixtures.steps(simulation):
         pass
-    return job
+    return simulation
 
 
 def _error(n: int, steps: int, *, euler: bool) -> float:
     """L2 distance at END to the series, or to backward Euler's, relative to theta."""
-    job = _march(n, END, steps)
-    d = job.discretisation
+    simulation = _march(n, END, steps)
+    d = simulation.discretisation
     measure = ExactErrors(
         d,
         w=lambda x, t: 0 * x,
         theta=lambda x, t: series(x[:, 1], t, steps if euler else None),
         gradient=lambda x, t: np.zeros((len(x), 2, 2)),
     )
-    return measure.of(job.stepper)["theta_L2"] / float(d.norms.l2(job.stepper.theta))
+    return measure.of(simulation.stepper)["theta_L2"] / float(d.norms.l2(simulation.stepper.theta))
 
 
-def robin_slab() -> list[Line]:
+def robin_slab() -> list[Check]:
     """Warming from 0 towards the steady state: first order in k, second in h; the steady state is linear, so exact."""
     n, counts = 48, [8, 16, 32]
     in_time = [_error(n, steps, euler=False) for steps in counts]
@@ -105,7 +105,7 @@ def robin_slab() -> list[Line]:
         order(fine, "theta at the end is O(k)", "analytic", 1.0, p_time),
         near(fine, "the error is that of backward Euler in every mode", "analytic", damped, in_time[-1], 0.03),
         order(space, "distance to backward Euler's series is O(h^2)", "analytic", 2.0, p_space),
-        Line(
+        Check(
             space,
             "it is between the best P1 function's and the interpolant's",
             "analytic",

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warmslip.model.loads import Loads
+from warmslip.records.check import Check, below, order
 from warmslip.studies.rates import least_squares, observed
 from warmslip.typing import Array
-from warmslip.verification.check import Line, below, order
 from warmslip.verification.exact import fixtures
 
 WIDTH, HEIGHT, DENSITY = 4.0, 1.0, 1.0
@@ -49,18 +49,24 @@ def _slide(steps: int, young: float, viscosity: float) -> Slide:
         contact__friction__coefficient=FRICTION,
     )
     mesh = fixtures.crossed(np.linspace(0, WIDTH, 9), np.linspace(0, HEIGHT, 3))
-    job = fixtures.run(scene, Loads(traction={"top": np.array([0.0, -PRESSURE])}), mesh)
-    y = fixtures.nodes(job)[:, 1]
+    simulation = fixtures.run(scene, Loads(traction={"top": np.array([0.0, -PRESSURE])}), mesh)
+    y = fixtures.nodes(simulation)[:, 1]
     squeeze = PRESSURE / young * y if young else 0 * y
-    fixtures.start(job, u=np.stack([0 * y, -PRESSURE / STIFFNESS - squeeze], axis=1), w=np.array([SPEED, 0.0]))
-    foot, rows = fixtures.on(job, "bottom"), []
-    for report in fixtures.steps(job):
-        w = fixtures.fields(job)[1]
+    fixtures.start(simulation, u=np.stack([0 * y, -PRESSURE / STIFFNESS - squeeze], axis=1), w=np.array([SPEED, 0.0]))
+    foot, rows = fixtures.on(simulation, "bottom"), []
+    for report in fixtures.steps(simulation):
+        w = fixtures.fields(simulation)[1]
         friction = float(np.ravel(report.friction_traction)[0])
         rows.append(
-            (*fixtures.mean(job, w), report.normal_force, -friction, report.slip, float(np.abs(w[foot, 0]).max()))
+            (
+                *fixtures.mean(simulation, w),
+                report.normal_force,
+                -friction,
+                report.slip,
+                float(np.abs(w[foot, 0]).max()),
+            )
         )
-    return Slide(scene.step, len(job.discretisation.surface.weights), *np.array(rows).T)
+    return Slide(scene.step, len(simulation.discretisation.surface.weights), *np.array(rows).T)
 
 
 def _rigid(k: float, steps: int) -> Array:
@@ -68,7 +74,7 @@ def _rigid(k: float, steps: int) -> Array:
     return np.maximum(SPEED - DECELERATION * k * np.arange(1, steps + 1), 0)
 
 
-def elastic_block() -> list[Line]:
+def elastic_block() -> list[Check]:
     """A soft block, which shakes and tilts: both momenta and the friction law, by their resultants, step by step."""
     s = _slide(80, young=200.0, viscosity=1.0)
     mass, weight = DENSITY * WIDTH * HEIGHT, PRESSURE * WIDTH
@@ -96,11 +102,11 @@ def elastic_block() -> list[Line]:
         below(
             name, "friction is mu N when all points slip", "analytic", fixtures.worst(law, 0, scale), fixtures.ROUND_OFF
         ),
-        Line(name, "steps in which all points slip", "analytic", 66.0, float(sliding.sum()), 50.0, 67.0),
+        Check(name, "steps in which all points slip", "analytic", 66.0, float(sliding.sum()), 50.0, 67.0),
     ]
 
 
-def rigid_block() -> list[Line]:
+def rigid_block() -> list[Check]:
     """A block made rigid by viscosity: velocities of a rigid one up to O(1/eta), the stop in the right step, then rest."""
     steps, viscosities = 40, [1e4, 1e5, 1e6]
     runs = [_slide(steps, young=0.0, viscosity=v) for v in viscosities]

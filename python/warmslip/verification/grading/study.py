@@ -12,15 +12,15 @@ from scipy.optimize import least_squares
 
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.materials import make_mesh
+from warmslip.records.check import Check, below, order
 from warmslip.scene.full import FullScene
 from warmslip.simulation.statistics import BALANCES, residuals, worse
 from warmslip.studies import rates
 from warmslip.studies.error_norms import TERMS, Comparison, Largest
 from warmslip.verification.assumptions.corners import corner_exponents
-from warmslip.verification.check import Line, below, order
 from warmslip.verification.grading.meshes import TimeBlock, Triangulation, family, time_blocks
 
-COARSEST = 4  # bricks a side of the mesh that is refined; two graded corners must not share an edge
+COARSEST = 4  # cells per side of the mesh that is refined; two graded corners must not share an edge
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Grids:
 UNIFORM = Grids({}, 0, 1)
 
 
-class March:
+class Member:
     """A scene on one mesh, stepped through blocks of constant step size; operators are assembled once."""
 
     def __init__(self, scene: FullScene, mesh: Any, blocks: list[TimeBlock]) -> None:
@@ -60,7 +60,7 @@ class March:
             self.stepper = stepper
             for n in range(1, block.steps + 1):
                 report = stepper.advance(*loads.at(block.begin + n * block.k))
-                if report.outcome.name != "right":
+                if report.outcome.name != "completed":
                     raise RuntimeError(
                         f"a step of size {block.k:g} at t = {stepper.time:g} ended: {report.outcome.name}"
                     )
@@ -94,8 +94,8 @@ def study(
     coarsest = Triangulation.of(make_mesh(scene.override(**{"mesh.n": COARSEST})))
     meshes = family(coarsest, grids.exponents, doublings[-1] + 1)
 
-    def member(n: int, doubling: int) -> March:
-        return March(scene, meshes[doubling].mesh(), grids.blocks(scene.time.end, n))
+    def member(n: int, doubling: int) -> Member:
+        return Member(scene, meshes[doubling].mesh(), grids.blocks(scene.time.end, n))
 
     *runs, finest = [member(n, j) for n, j in zip(sizes, doublings, strict=True)]
     finer = [*runs[1:], finest]
@@ -120,7 +120,7 @@ def study(
             "cells": len(run.discretisation.mesh.cells),
             **{f"e_{term}": found.values[term] for term in TERMS},
             **{f"gap_{term}": gap.values[term] for term in TERMS},
-            **{f"identity_{name}": run.worst[name] for name in BALANCES},
+            **{f"residual_{name}": run.worst[name] for name in BALANCES},
         }
         for n, run, found, gap in zip(sizes[:-1], runs, largest, gaps, strict=True)
     ]
@@ -159,9 +159,9 @@ def grids(scene: FullScene, halvings: int = 8) -> Grids:
     return Grids({corner.point: corner.exponent_u for corner in corners if corner.exponent_u < 1}, halvings, 4)
 
 
-def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: list[dict[str, Any]]) -> list[Line]:
+def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: list[dict[str, Any]]) -> list[Check]:
     """Order 1 +- 0.1 at every halving of the graded study, by the unbiased errors and between successive grids; less between the
-    uniform grids in every term; closed books.
+    uniform grids in every term; balances that close.
 
     The fitted order of the uniform |w|_L2 is not judged: its errors do not follow one power yet.
     """
@@ -176,15 +176,15 @@ def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: li
         for before, row in pairwise(uniform):
             what = f"order of {term} between uniform grids 1/{before['n']} and 1/{row['n']} is less than between any graded ones"
             between = rates.observed(before[f"gap_{term}"], row[f"gap_{term}"])
-            out.append(Line(name, what, "theory", min(between_graded), between, 0.4, min(between_graded)))
+            out.append(Check(name, what, "theory", min(between_graded), between, 0.4, min(between_graded)))
         if term == "w_L2":
             continue
-        owed = rates.entitled(term, hot=True, singular_conductivity=False, viscosity=scene.viscosity.pair(2))
+        owed = rates.expected_order(term, hot=True, singular_conductivity=False, viscosity=scene.viscosity.pair(2))
         what = f"order of {term} at the last halving of uniform grids is less: the data are not smooth"
-        out.append(Line(name, what, "theory", owed, uniform[-1][f"order_{term}"], owed - 0.12, 0.9))
+        out.append(Check(name, what, "theory", owed, uniform[-1][f"order_{term}"], owed - 0.12, 0.9))
     for kind, table in (("graded", graded), ("uniform", uniform)):
         for term in TERMS if kind == "graded" else ("u_V", "theta_L2"):
             what = f"{term} of the {kind} grids follows one power: misfit of the fitted reference"
             out.append(below(name, what, "theory", table[-1][f"misfit_{term}"], 0.02))
-    worst = max(row[f"identity_{identity}"] for row in [*graded, *uniform] for identity in BALANCES)
-    return [*out, below(name, "the books of every step close", "identity", worst, 1e-11)]
+    worst = max(row[f"residual_{balance}"] for row in [*graded, *uniform] for balance in BALANCES)
+    return [*out, below(name, "the balances of every step close", "identity", worst, 1e-11)]

@@ -13,7 +13,7 @@ import sympy as sp
 from warmslip.scene.full import FullScene
 from warmslip.verification.mms import symbolic
 from warmslip.verification.mms.fields_smooth import HALF, TENTH, THOUSANDTH, cooled_walls
-from warmslip.verification.mms.symbolic import Description, T, X
+from warmslip.verification.mms.symbolic import ExactFields, T, X
 
 # open for x < OPENING(t), closed beyond: between nodes of every grid at almost all times, and never at rest
 OPENING = sp.Rational(3, 10) + T / 2
@@ -26,7 +26,7 @@ def _ramp(distance: Any, power: int) -> Any:
     return symbolic.when(distance > 0, distance**power)
 
 
-def opening(scene: FullScene, lag: float = 0.0) -> Description:
+def opening(scene: FullScene, lag: float = 0.0) -> ExactFields:
     """Slip to the right; the penetration is proportional to x - OPENING(t), so that the pressure has a kink there.
 
     u, w and theta are smooth and the traction is Lipschitz: quadrature errors at the kink are O(h^2) and of changing
@@ -35,13 +35,13 @@ def opening(scene: FullScene, lag: float = 0.0) -> Description:
     *tangents, n = symbolic.axes(scene.mesh.dim)
     u = [TENTH * (1 - n**2) * (1 + X / 2 * (1 - X / 2)) * sp.exp(T), *([sp.S.Zero] * (len(tangents) - 1))]
     down = -(1 - n) * (sp.nsimplify(scene.contact.gap, rational=True) + 3 * THOUSANDTH * (X - OPENING) * (1 + X / 4))
-    share = sp.Matrix([1] + [0] * (scene.mesh.dim - 1))
-    return Description(
-        sp.Matrix([*u, down]), TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T)), "mixed", share=share, lag=lag
+    ratio = sp.Matrix([1] + [0] * (scene.mesh.dim - 1))
+    return ExactFields(
+        sp.Matrix([*u, down]), TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T)), "mixed", friction_ratio=ratio, lag=lag
     )
 
 
-def stick_slip(scene: FullScene, lag: float = 0.0, power: int = 3) -> Description:
+def stick_slip(scene: FullScene, lag: float = 0.0, power: int = 3) -> ExactFields:
     """Pressed everywhere; the slip is the ramp (x - STICKING)_+^power, the friction mu p (1 - (STICKING - x)_+).
 
     With power = 3 the body force is Lipschitz across x = STICKING(t) and the orders of smooth data are owed. With power
@@ -56,6 +56,6 @@ def stick_slip(scene: FullScene, lag: float = 0.0, power: int = 3) -> Descriptio
     inside = n * (1 - n) * (1 + X / 2) * sp.sin(2 * T) * TENTH
     u = [HALF * (1 - n**2) * slid + inside, *([sp.S.Zero] * (len(tangents) - 1))]
     down = -THOUSANDTH * (1 - n) * (2 + sp.cos(sp.pi * X / 2)) * (1 + T / 2)
-    share = sp.Matrix([1 - _ramp(edge - X, 1)] + [0] * (scene.mesh.dim - 1))
+    ratio = sp.Matrix([1 - _ramp(edge - X, 1)] + [0] * (scene.mesh.dim - 1))
     theta = TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T))
-    return Description(sp.Matrix([*u, down]), theta, "mixed", share=share, lag=lag)
+    return ExactFields(sp.Matrix([*u, down]), theta, "mixed", friction_ratio=ratio, lag=lag)

@@ -14,7 +14,7 @@ import sympy as sp
 
 from warmslip.scene.full import FullScene
 from warmslip.verification.mms import symbolic
-from warmslip.verification.mms.symbolic import Description, T, X, Y
+from warmslip.verification.mms.symbolic import ExactFields, T, X, Y
 
 HALF, TENTH, THOUSANDTH = sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(1, 1000)
 
@@ -31,7 +31,7 @@ def waves(scene: FullScene) -> Any:
     return 2 + sum(sp.cos(sp.pi * s / 2) for s in tangents) / (2 * len(tangents))
 
 
-def slip(scene: FullScene, lag: float = 0.0) -> Description:
+def slip(scene: FullScene, lag: float = 0.0) -> ExactFields:
     """Slip everywhere; in space its direction turns along the surface and in time. Supports as in the paper's problem."""
     n = symbolic.axes(scene.mesh.dim)[-1]
     along = [
@@ -40,10 +40,10 @@ def slip(scene: FullScene, lag: float = 0.0) -> Description:
     ][: scene.mesh.dim - 1]
     u = [TENTH * (1 - n**2) * s for s in along]
     down = -THOUSANDTH * (1 - n) * waves(scene) * (1 + T / 2)
-    return Description(sp.Matrix([*u, down]), TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T)), "slip", lag=lag)
+    return ExactFields(sp.Matrix([*u, down]), TENTH * cooled_walls(scene) * (2 + sp.sin(6 * T)), "slip", lag=lag)
 
 
-def slip_by_law(scene: FullScene, lag: float = 0.0) -> Description:
+def slip_by_law(scene: FullScene, lag: float = 0.0) -> ExactFields:
     """Slip under the paper's law alone: all fields grow as exp(t), and sigma_tau = -mu p w_tau/|w_tau| holds on n = 0.
 
     The tangential part a(1 - n^2) + b n (1 - n) has the slip a, and b is what sigma_tau lacks without it: b changes neither the
@@ -55,7 +55,7 @@ def slip_by_law(scene: FullScene, lag: float = 0.0) -> Description:
     direction = [1] if dim == 2 else [sp.cos((X * Y + 1) / 2), sp.sin((X * Y + 1) / 2)]
     down = -2 * TENTH**2 * (1 - n) * (1 + 3 * n) * waves(scene)
     u = sp.Matrix([*(TENTH / 2 * (1 + X / 2 * (1 - X / 2)) * c * (1 - n**2) for c in direction), down])
-    plain = Description(u * grow, TENTH * cooled_walls(scene) * grow, "slip", own=True, lag=lag)
+    plain = ExactFields(u * grow, TENTH * cooled_walls(scene) * grow, "slip", satisfies_contact_law=True, lag=lag)
     sigma = symbolic.stress(scene, plain.u, plain.w, symbolic.read(scene, plain)[0]).subs({n: 0, T: 0})
     viscous, elastic = (
         sp.nsimplify(table.pair(dim)[1], rational=True) for table in (scene.viscosity, scene.elasticity)
@@ -69,7 +69,7 @@ def slip_by_law(scene: FullScene, lag: float = 0.0) -> Description:
     return replace(plain, u=plain.u + sp.Matrix([*(c * n * (1 - n) for c in b), 0]) * grow)
 
 
-def stick(scene: FullScene, lag: float = 0.0) -> Description:
+def stick(scene: FullScene, lag: float = 0.0) -> ExactFields:
     """Stick under the paper's law alone: the tangential displacement of the contact part is frozen, the body above it moves."""
     dim = scene.mesh.dim
     *tangents, n = symbolic.axes(dim)
@@ -78,10 +78,12 @@ def stick(scene: FullScene, lag: float = 0.0) -> Description:
     profile = 2 + sp.cos(sp.pi * X / 2) / 4
     down = -(TENTH**2) * (1 - n) * (1 + 3 * n) * profile * (1 + T + T**2 / 4)
     u = sp.Matrix([*(f + m for f, m in zip(frozen, moving, strict=True)), down])
-    return Description(u, TENTH * cooled_walls(scene) * (2 + sp.sin(3 * T)), "stick", own=True, lag=lag)
+    return ExactFields(
+        u, TENTH * cooled_walls(scene) * (2 + sp.sin(3 * T)), "stick", satisfies_contact_law=True, lag=lag
+    )
 
 
-def affine(scene: FullScene, lag: float = 0.0) -> Description:
+def affine(scene: FullScene, lag: float = 0.0) -> ExactFields:
     """Affine in space, anything in time, with a constant pressure and direction of slip: P1 elements make no error in space.
 
     With `lag` = k the discrete solution is the exact one to round-off on any mesh; without, its error is that of backward
@@ -97,4 +99,4 @@ def affine(scene: FullScene, lag: float = 0.0) -> Description:
     ]
     down = -THOUSANDTH * (1 + T / 2 + sp.sin(3 * T) / 4) + TENTH**2 * n * sp.exp(-T)
     theta = 3 + sp.sin(6 * T) + sum((i + 1) * s for i, s in enumerate([*tangents, n])) * sp.cos(T)
-    return Description(sp.Matrix([*u, down]), theta, "slip", lag=lag)
+    return ExactFields(sp.Matrix([*u, down]), theta, "slip", lag=lag)

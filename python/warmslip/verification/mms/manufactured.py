@@ -22,13 +22,13 @@ from warmslip.studies import rates
 from warmslip.studies.error_norms import TERMS, ExactErrors, Largest
 from warmslip.typing import Array
 from warmslip.verification.mms import symbolic
-from warmslip.verification.mms.symbolic import Description, Manufactured, T, X, Y
+from warmslip.verification.mms.symbolic import ExactFields, Manufactured, T, X, Y
 
 ROUNDING = 1e-10  # of scale: no contradiction, only floating point
 TIMES = 11  # at which a description is checked
 
 
-def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactured:
+def derive(scene: FullScene, fields: ExactFields, points: int = 3) -> Manufactured:
     """The loads under which `fields` solve the scene's problem, for fields that are what they claim to be.
 
     They are checked on a grid of places and times. Raises ValueError, one sentence with the place, when they do not vanish on
@@ -60,10 +60,10 @@ def _places(scene: FullScene, part: str) -> Array:
 
 
 def _contradictions(
-    scene: FullScene, fields: Description, solution: Manufactured, x: Array, times: Array
+    scene: FullScene, fields: ExactFields, solution: Manufactured, x: Array, times: Array
 ) -> Iterator[tuple[str, Array, float]]:
     """What is wrong on the contact part, and where and when first."""
-    touch, claim = solution.touch, fields.claim
+    touch, state = solution.touch, fields.contact_state
     load = max(np.abs(touch.pressure(x, t)).max() for t in times)
     fast = max(np.abs(solution.w(x, t)).max() for t in times)
     before: Array | None = None
@@ -75,18 +75,18 @@ def _contradictions(
         speed, force = np.linalg.norm(slip, axis=1), np.linalg.norm(friction, axis=1)
         misfit = np.linalg.norm(friction * speed[:, None] - bound[:, None] * slip, axis=1)
         faults = []
-        if claim != "mixed":
-            faults.append((~(p > ROUNDING * load), f"the fields leave contact where they should {claim}"))
-        if claim == "slip":
+        if state != "mixed":
+            faults.append((~(p > ROUNDING * load), f"the fields leave contact where they should {state}"))
+        if state == "slip":
             faults.append((~(speed > ROUNDING * fast), "the slip stops where it should go on"))
             reverses = _turned(slip) if before is None else _turned(slip) | (np.sum(slip * before, axis=1) <= 0)
             faults.append((reverses, "the slip reverses"))
-        if claim == "stick":
+        if state == "stick":
             faults.append((speed > ROUNDING * fast, "the fields slip where they should stick"))
             faults.append((~(force < bound), "the friction traction of sticking lies beyond the cone"))
         faults.append((~(force <= bound + ROUNDING * load), "the friction traction lies beyond the cone"))
         faults.append((~(misfit <= ROUNDING * load * fast), "the friction traction does not oppose the slip"))
-        if fields.own:
+        if fields.satisfies_contact_law:
             faults.append((~(np.abs(extra).max(axis=1) <= ROUNDING * load), "the law of friction alone does not hold"))
         for where, what in faults:
             if where.any():
@@ -105,7 +105,7 @@ def _turned(slip: Array) -> Array:
     return np.asarray(found.ravel())
 
 
-def sliding() -> Description:
+def sliding() -> ExactFields:
     """The fields of `slipping`."""
     # u_y < 0 on y = 0 presses the body into the foundation; u_x grows in time, so w_x > 0 there
     u = sp.Matrix(
@@ -116,7 +116,7 @@ def sliding() -> Description:
     )
     # theta moves fast, so that the errors in time are seen beside those in space
     theta = sp.sin(sp.pi * X) * (1 - Y) * (1 + Y / 2) * (2 + sp.sin(6 * T))
-    return Description(u, theta, claim="slip")
+    return ExactFields(u, theta, contact_state="slip")
 
 
 def slipping(scene: FullScene) -> Manufactured:
@@ -143,25 +143,25 @@ def errors(
     `mesh` replaces the scene's structured one; `watch` sees the run after every step. Raises RuntimeError when a step is not
     right.
     """
-    job = Simulation(scene, discretisation=discretise(scene, loads=solution.loads, mesh=mesh))
-    d = job.discretisation
+    simulation = Simulation(scene, discretisation=discretise(scene, loads=solution.loads, mesh=mesh))
+    d = simulation.discretisation
     nodes = np.asarray(d.mesh.nodes)
-    d.restart(job.stepper, solution.u(nodes, 0.0), solution.w(nodes, 0.0), solution.theta(nodes, 0.0), 0.0)
+    d.restart(simulation.stepper, solution.u(nodes, 0.0), solution.w(nodes, 0.0), solution.theta(nodes, 0.0), 0.0)
     measure = ExactErrors(d, w=solution.w, theta=solution.theta, gradient=solution.gradient)
     largest = Largest()
-    for _ in job.steps():
-        largest.add(measure.of(job.stepper))
+    for _ in simulation.steps():
+        largest.add(measure.of(simulation.stepper))
         if watch:
-            watch(job)
-    if job.outcome != "right":
+            watch(simulation)
+    if simulation.outcome != "completed":
         raise RuntimeError(
-            f"the manufactured run with n = {scene.mesh.n}, steps = {scene.time.steps} ended: {job.outcome}"
+            f"the manufactured run with n = {scene.mesh.n}, steps = {scene.time.steps} ended: {simulation.outcome}"
         )
-    return largest.values, job
+    return largest.values, simulation
 
 
 def grid(path: str, levels: list[int]) -> list[tuple[int, int]]:
-    """(1/h, steps) along `h=k`, or along `k=h^2` starting from three quarters of the mesh, with as many steps as bricks."""
+    """(1/h, steps) along `h=k`, or along `k=h^2` starting from three quarters of the mesh, with as many steps as cells."""
     if path == "h=k":
         return [(n, n) for n in levels]
     coarse = [3 * n // 4 for n in levels]
@@ -182,12 +182,12 @@ def table(scene: FullScene, couplings: list[str], levels: list[int], path: str) 
         before: dict[str, float] | None = None
         for n, steps in grid(path, levels):
             one = scene.override(**{"mesh.n": n, "time.steps": steps, "time.coupling": coupling})
-            found, job = errors(one, slipping(one))
+            found, simulation = errors(one, slipping(one))
             line = {"path": path, "coupling": coupling, "n": n, "steps": steps, "h": 1 / n, "k": one.step}
             line |= {f"e_{t}": found[t] for t in TERMS}
             line |= {f"order_{t}": rates.observed(before[t], found[t]) if before else float("nan") for t in TERMS}
-            line |= {"slip": job.report.slip, "stick": job.report.stick, "open": job.report.open}
-            line |= {f"identity_{name}": value for name, value in job.statistics.residuals.items()}
+            line |= {"slip": simulation.report.slip, "stick": simulation.report.stick, "open": simulation.report.open}
+            line |= {f"residual_{name}": value for name, value in simulation.statistics.residuals.items()}
             out.append(line)
             before = found
     return out

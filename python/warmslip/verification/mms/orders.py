@@ -13,13 +13,13 @@ from typing import Any, Literal
 import numpy as np
 
 from warmslip.model.materials import make_mesh
+from warmslip.records import check
+from warmslip.records.check import Check
 from warmslip.scene.full import FullScene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies import rates
-from warmslip.verification import check
-from warmslip.verification.check import Line
 from warmslip.verification.mms.manufactured import derive, errors
-from warmslip.verification.mms.symbolic import Description, Manufactured
+from warmslip.verification.mms.symbolic import ExactFields, Manufactured
 
 # orders owed on smooth data, by what is refined
 SPACE = {"u_V": 1.0, "w_L2": 2.0, "theta_L2": 2.0}
@@ -36,7 +36,7 @@ class Family:
 
     case: str
     scene: FullScene
-    fields: Callable[[FullScene], Description]
+    fields: Callable[[FullScene], ExactFields]
     grids: Sequence[tuple[int, int]]
     owed: dict[str, float]
     refined: Literal["h", "k"] = "h"
@@ -65,7 +65,7 @@ def measure(
     return [errors(scene, solution, watch=watch)[0] for scene in scenes], solution
 
 
-def order_lines(case: str, sizes: Sequence[float], found: Sequence[float], owed: float) -> list[Line]:
+def order_lines(case: str, sizes: Sequence[float], found: Sequence[float], owed: float) -> list[Check]:
     """Order and straightness of errors `found` over mesh or step `sizes`; errors of zero are exact and have no order.
 
     Raises ValueError for fewer than three sizes.
@@ -81,7 +81,7 @@ def order_lines(case: str, sizes: Sequence[float], found: Sequence[float], owed:
     ]
 
 
-def orders(family: Family) -> list[Line]:
+def orders(family: Family) -> list[Check]:
     """Lines for every term that the family is owed an order of."""
     found, _ = measure(family)
     sizes = [1 / scene.mesh.counts[0] if family.refined == "h" else scene.step for scene in family.scenes]
@@ -93,7 +93,7 @@ def orders(family: Family) -> list[Line]:
 
 
 def distorted(scene: FullScene, amount: float = 0.2, seed: int = 1) -> Any:
-    """The scene's mesh with its nodes moved by up to `amount` of a brick a direction, the faces of the box kept flat."""
+    """The scene's mesh with its nodes moved by up to `amount` of a grid cell a direction, the faces of the box kept flat."""
     mesh = make_mesh(scene)
     x = np.asarray(mesh.nodes)
     sides = np.array(scene.mesh.sides)

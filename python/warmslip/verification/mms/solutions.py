@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
+from warmslip.records import check
+from warmslip.records.check import Check
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.summary import summary
 from warmslip.studies.error_norms import TERMS
-from warmslip.verification import check
-from warmslip.verification.check import Line
 from warmslip.verification.mms import symbolic
 from warmslip.verification.mms.fields_kinked import OPENING, STICKING, opening, stick_slip
 from warmslip.verification.mms.fields_smooth import affine, slip, slip_by_law, stick
 from warmslip.verification.mms.manufactured import derive, errors, sliding
 from warmslip.verification.mms.orders import SPACE, TIME, Family, distorted, orders
-from warmslip.verification.mms.symbolic import Description
+from warmslip.verification.mms.symbolic import ExactFields
 
 COUPLINGS = ("staggered", "lagged", "monolithic")
 ROUND_OFF = 1e-11  # of scale, after a few steps
@@ -34,7 +34,7 @@ NEAR = 2.0  # mesh sizes within which a status may differ from the exact one
 DOUBLED, FINER = ((8, 8), (16, 16), (32, 32)), ((16, 16), (32, 32), (64, 64))
 FINER_IN_SPACE = ((16, 3), (32, 3), (64, 3))
 SQUARED = ((8, 16), (16, 64), (32, 256))
-Lagged = Callable[[FullScene, float], Description]
+Lagged = Callable[[FullScene, float], ExactFields]
 
 
 def setting(
@@ -54,16 +54,16 @@ def setting(
     return full_model(load("paper_isotropic" if dim == 2 else "block_3d")).override(**keys | dict(values or {}))
 
 
-def lagged(fields: Lagged) -> Callable[[FullScene], Description]:
+def lagged(fields: Lagged) -> Callable[[FullScene], ExactFields]:
     """Fields with data of the discrete scheme at the scene's step."""
     return lambda scene: fields(scene, scene.step)
 
 
-def exactness(dim: int, coupling: str) -> Line:
+def exactness(dim: int, coupling: str) -> Check:
     """Affine fields on a distorted mesh: the largest error at any step over the field's norm at the end."""
     scene = setting(dim, {"mesh.n": 5 if dim == 2 else 3, "time.steps": 5}, coupling=coupling, floating=True)
-    found, job = errors(scene, derive(scene, affine(scene, scene.step)), mesh=distorted(scene))
-    norms = summary(job)["norms"]
+    found, simulation = errors(scene, derive(scene, affine(scene, scene.step)), mesh=distorted(scene))
+    norms = summary(simulation)["norms"]
     return check.below(
         f"affine fields on a distorted mesh, {dim}D, {coupling}",
         "every term of both balances and of the contact law has its factor, sign and time index",
@@ -73,19 +73,19 @@ def exactness(dim: int, coupling: str) -> Line:
     )
 
 
-def sticking(dim: int, quadrature: str) -> Line:
+def sticking(dim: int, quadrature: str) -> Check:
     """The largest tangential velocity of a contact node at any step, over the largest velocity anywhere."""
     scene = setting(dim, {"mesh.n": 8 if dim == 2 else 4, "time.steps": 8, "contact.quadrature": quadrature})
     worst, fastest = 0.0, 0.0
 
-    def watch(job: Simulation) -> None:
+    def watch(simulation: Simulation) -> None:
         nonlocal worst, fastest
-        w = job.discretisation.field(job.stepper.w)
-        touching = np.unique(job.discretisation.mesh.parts[scene.contact.part])
+        w = simulation.discretisation.field(simulation.stepper.w)
+        touching = np.unique(simulation.discretisation.mesh.parts[scene.contact.part])
         worst = max(worst, float(np.abs(w[touching, :-1]).max()))
         fastest = max(fastest, float(np.abs(w).max()))
         # with more points than nodes sticking points share a force as they please, some up to their bounds
-        if quadrature == "nodal" and job.report.stick != len(job.discretisation.surface.weights):
+        if quadrature == "nodal" and simulation.report.stick != len(simulation.discretisation.surface.weights):
             worst = np.inf
 
     errors(scene, derive(scene, stick(scene)), watch=watch)
@@ -98,7 +98,7 @@ def sticking(dim: int, quadrature: str) -> Line:
     )
 
 
-def status(name: str, n: int) -> Line:
+def status(name: str, n: int) -> Check:
     """How far from the exact point of change, in mesh sizes and at any step, a contact point has another status."""
     fields, change, before, beyond = {
         "opening": (opening, OPENING, 0, 2),
@@ -108,11 +108,11 @@ def status(name: str, n: int) -> Line:
     place = symbolic.function(change, 2)
     worst = 0.0
 
-    def watch(job: Simulation) -> None:
+    def watch(simulation: Simulation) -> None:
         nonlocal worst
-        x = np.asarray(job.discretisation.surface.positions)
-        distance = x[:, 0] - place(x, job.stepper.time)
-        wrong = np.asarray(job.stepper.status) != np.where(distance < 0, before, beyond)
+        x = np.asarray(simulation.discretisation.surface.positions)
+        distance = x[:, 0] - place(x, simulation.stepper.time)
+        wrong = np.asarray(simulation.stepper.status) != np.where(distance < 0, before, beyond)
         worst = max(worst, float(np.abs(distance[wrong]).max(initial=0)) * n)
 
     errors(scene, derive(scene, fields(scene), points=6), watch=watch)
@@ -125,7 +125,7 @@ def status(name: str, n: int) -> Line:
     )
 
 
-def load_quadrature(points: int = 3, n: int = 16) -> list[Line]:
+def load_quadrature(points: int = 3, n: int = 16) -> list[Check]:
     """Errors with the load quadrature in use against those with eight points a direction, on the slip solution."""
     scene = setting(2, {"mesh.n": n, "time.steps": 4})
     few, many = (errors(scene, derive(scene, slip(scene, scene.step), points))[0] for points in (points, 8))
@@ -178,7 +178,7 @@ def families(full: bool = True) -> Iterator[Family]:
         yield Family("slip, 3D, k ~ h^2", setting(3, half), slip, ((6, 9), (8, 16), (10, 25)), SPACE)
 
 
-def report(full: bool = True) -> list[Line]:
+def report(full: bool = True) -> list[Check]:
     """All lines: two to three minutes of one core, without `full` half a minute."""
     lines = [exactness(dim, coupling) for dim in (2, 3) for coupling in COUPLINGS]
     lines += [sticking(dim, quadrature) for dim in (2, 3) for quadrature in ("nodal", "gauss-3")]

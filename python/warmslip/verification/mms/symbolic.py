@@ -39,12 +39,12 @@ Function = Callable[[Array, float], Array]
 
 
 @dataclass(frozen=True)
-class Description:
+class ExactFields:
     """Exact fields in the symbols x, y[, z], t and what they do on the contact part; matrices are (d, 1).
 
-    `claim` is what holds on all of the contact part at all times; "mixed" claims nothing beyond the law. `share` is the
-    friction traction lambda over its bound mu p; without it lambda is mu p w_tau/|w_tau|, or -sigma_tau for a claim of
-    "stick" under the paper's law alone, `own`.
+    `contact_state` is what holds on all of the contact part at all times; "mixed" claims nothing beyond the law.
+    `friction_ratio` is the friction traction lambda over its bound mu p; without it lambda is mu p w_tau/|w_tau|, or -sigma_tau
+    for a state of "stick" under the paper's law alone, `satisfies_contact_law`.
 
     With `lag` = k > 0 the data are those of backward Euler with step k: d/dt is the difference over the last step, and what
     the coupling reads from the step before is taken from there. u and theta are then its exact solution at every step, up to
@@ -53,9 +53,9 @@ class Description:
 
     u: Any
     theta: Any
-    claim: Literal["slip", "stick", "mixed"]
-    share: Any = None
-    own: bool = False
+    contact_state: Literal["slip", "stick", "mixed"]
+    friction_ratio: Any = None
+    satisfies_contact_law: bool = False
     lag: float = 0.0
 
     def before(self, field: Any) -> Any:
@@ -72,7 +72,7 @@ class Description:
 
 
 @dataclass(frozen=True)
-class Touch:
+class ContactData:
     """What happens on the contact part: p, mu p, lambda, w_tau and the extra traction g_C; (points,) and (points, d)."""
 
     pressure: Function
@@ -91,7 +91,7 @@ class Manufactured:
     theta: Function
     gradient: Function
     loads: Loads
-    touch: Touch
+    touch: ContactData
 
 
 def axes(dim: int) -> tuple[Any, ...]:
@@ -143,14 +143,14 @@ def stress(scene: FullScene, u: Any, w: Any, theta: Any) -> Any:
     return sigma
 
 
-def read(scene: FullScene, fields: Description) -> tuple[Any, Any]:
+def read(scene: FullScene, fields: ExactFields) -> tuple[Any, Any]:
     """The temperature that the momentum balance reads and the velocity that the heat balance reads, by the coupling."""
     coupling = scene.time.coupling
     theta = fields.theta if coupling == "monolithic" else fields.before(fields.theta)
     return theta, fields.before(fields.w) if coupling == "lagged" else fields.w
 
 
-def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactured:
+def derive(scene: FullScene, fields: ExactFields, points: int = 3) -> Manufactured:
     """The loads under which `fields` solve the scene's problem; load quadrature has `points` points a direction.
 
     Whether the fields are what they claim to be is for `manufactured.derive` to say. Raises ValueError for a contact part
@@ -159,7 +159,7 @@ def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactur
     dim, contact, exchange = scene.mesh.dim, scene.contact, scene.contact.heat_exchange
     if contact.part != "bottom":
         raise ValueError(f"manufactured fields touch at 'bottom', not at '{contact.part}'; change contact.part")
-    if fields.own and not (contact.stiffness and exchange.conductance):
+    if fields.satisfies_contact_law and not (contact.stiffness and exchange.conductance):
         raise ValueError("no gap and no foundation temperature act without stiffness and conductance; set both")
     x, nu, u, w, theta = axes(dim), normal(contact.part, dim), fields.u, fields.w, fields.theta
     theta_read, w_read = read(scene, fields)
@@ -172,7 +172,7 @@ def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactur
         return function(expression.subs(x[-1], 0), dim)
 
     law: dict[str, Any]
-    if fields.own:
+    if fields.satisfies_contact_law:
         pressure = -(nu.T * sigma * nu)[0]
         law = {
             "gap": on_contact(u.dot(nu) - pressure / contact.stiffness),
@@ -183,15 +183,15 @@ def derive(scene: FullScene, fields: Description, points: int = 3) -> Manufactur
         pressure = contact.stiffness * when(penetration > 0, penetration)
         law = {"gap": contact.gap, "foundation_temperature": exchange.foundation_temperature}
     bound, slip = contact.friction.coefficient * pressure, w - w.dot(nu) * nu
-    if fields.share is not None:
-        friction = bound * fields.share
-    elif fields.claim == "stick":
+    if fields.friction_ratio is not None:
+        friction = bound * fields.friction_ratio
+    elif fields.contact_state == "stick":
         friction = nu.dot(sigma * nu) * nu - sigma * nu
     else:
         friction = bound * slip / sp.sqrt(slip.dot(slip))
     extra = sigma * nu + pressure * nu + friction
-    touch = Touch(*map(on_contact, (pressure, bound, friction, slip, extra)))
-    if not fields.own:
+    touch = ContactData(*map(on_contact, (pressure, bound, friction, slip, extra)))
+    if not fields.satisfies_contact_law:
         flux = exchange.conductance * (theta - exchange.foundation_temperature) - q.dot(nu)
         law |= {"contact_traction": touch.extra, "contact_flux": on_contact(flux)}
 

@@ -48,13 +48,13 @@ from scipy.integrate import trapezoid
 
 from warmslip.model.loads import evaluate
 from warmslip.model.materials import make_mesh
+from warmslip.records import check
+from warmslip.records.check import Check
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification import check
-from warmslip.verification.check import Line
 from warmslip.verification.mms.manufactured import errors, slipping
 from warmslip.verification.mms.symbolic import Manufactured
 from warmslip.verification.theory.bound_fields import Exact, Rule, strain
@@ -134,13 +134,13 @@ class Bound:
             total += sign * rule.integral(work)
         return total
 
-    def __call__(self, job: Simulation) -> None:
+    def __call__(self, simulation: Simulation) -> None:
         """Adds the squares at the time of the run."""
         exact, body, nodes, k = self._exact, self._body, self._nodes, self._k
-        d, t, x, rule = job.discretisation, job.stepper.time, body.x, self._contact
+        d, t, x, rule = simulation.discretisation, simulation.stepper.time, body.x, self._contact
         w_before, theta_before, w_gap_before, theta_gap_before = self._last
         w, theta, w_gap, theta_gap = self._last = self._at(t)
-        w_hk, theta_hk = d.field(job.stepper.w), d.field(job.stepper.theta)
+        w_hk, theta_hk = d.field(simulation.stepper.w), d.field(simulation.stepper.theta)
         w_x, theta_x, w_rate = exact.w_x(x, t), exact.theta_x(x, t), exact.w_rate(x, t)
         delta = (w - w_before) / k
         residual = self.residual(t, delta, w_gap)
@@ -225,7 +225,7 @@ def measure(coupling: str, levels: Sequence[int], scene: FullScene | None = None
 
 def lines(
     coupling: str = "lagged", levels: Sequence[int] = (8, 16, 32, 64), scene: FullScene | None = None
-) -> list[Line]:
+) -> list[Check]:
     """Takes about 30 s; raises ValueError for fewer than three levels."""
     if len(levels) < 3:
         raise ValueError(f"{len(levels)} levels say nothing about an order; give at least three")
@@ -233,11 +233,11 @@ def lines(
     case = f"bound of section 4, {coupling}"
 
     # fields and their interpolants alone: what is tested is the reading of (4.3), not the core
-    def order(name: str, proves: str, owed: float) -> Line:
+    def order(name: str, proves: str, owed: float) -> Check:
         found, _ = least_squares([row["h"] for row in rows], [row[name] for row in rows])
         return check.near(f"{case}, order of {name}", proves, "theory", owed, found, BAND, scale=1.0)
 
-    def worst(name: str, proves: str, most: float) -> Line:
+    def worst(name: str, proves: str, most: float) -> Check:
         return check.below(f"{case}, {name}", proves, "theory", max(row[name] for row in rows), most)
 
     return [

@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln
 
+from warmslip.records import check
+from warmslip.records.check import Check
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.reader import load
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
-from warmslip.verification import check
-from warmslip.verification.check import Line
 from warmslip.verification.theory.fixed_point import ROUND_OFF, Fields, Iteration, Lambda, iterate, solution
 
 SAME = 1e-12  # of the solution: two orders above what is observed
@@ -89,7 +89,7 @@ def missed(run: Iteration, solved: Fields) -> float:
     return measure(run.last, solved) / measure(solved, run.zero)
 
 
-def fixed_point(reading: str, hot: float, *, n: int = 8, steps: int = 16) -> Line:
+def fixed_point(reading: str, hot: float, *, n: int = 8, steps: int = 16) -> Check:
     scene = setting(reading, n=n, steps=steps, hot=hot)
     return check.below(
         f"Lambda's fixed point, {reading}, theta_F = {hot:g}",
@@ -111,7 +111,7 @@ def decline(run: Iteration) -> float:
     return least_squares(m[half:] + 1, falling[half:])[0]
 
 
-def factorial(reading: str, *, n: int = 8, steps: int = 64, short: float = 0.05, long: float = 0.2) -> list[Line]:
+def factorial(reading: str, *, n: int = 8, steps: int = 64, short: float = 0.05, long: float = 0.2) -> list[Check]:
     """How the factors fall, and whether the constant c belongs to the material alone."""
     runs = [iterate(setting(reading, n=n, steps=steps, end=end, factor=STRONG)) for end in (short, long)]
     c = [fitted(run) for run in runs]
@@ -136,14 +136,14 @@ def factorial(reading: str, *, n: int = 8, steps: int = 64, short: float = 0.05,
     ]
 
 
-def transient(*, n: int = 8, steps: int = 64, end: float = 0.5) -> list[Line]:
+def transient(*, n: int = 8, steps: int = 64, end: float = 0.5) -> list[Check]:
     """Strong coupling over a long time: cT passes m before m! passes (cT)^m."""
     scene = setting("consistent", n=n, steps=steps, end=end, factor=STRONGER)
     run = iterate(scene, most=400)
     case = f"Lambda at length, consistent, {STRONGER:g} R, T = {end:g}"
     growth = float(run.pairs.max())
     return [
-        Line(case, "differences grow before the factorial wins", "theory", np.inf, growth, 2.0, np.inf),
+        Check(case, "differences grow before the factorial wins", "theory", np.inf, growth, 2.0, np.inf),
         check.below(
             case,
             "and it wins: the limit is the monolithic solution",
@@ -154,7 +154,7 @@ def transient(*, n: int = 8, steps: int = 64, end: float = 0.5) -> list[Line]:
     ]
 
 
-def nilpotent(coupling: str, *, n: int = 8, steps: int = 8) -> list[Line]:
+def nilpotent(coupling: str, *, n: int = 8, steps: int = 8) -> list[Check]:
     """One term from the step before: Lambda^2N, or Lambda^N of two such terms, is constant, and no smaller power is."""
     scene = setting("consistent", n=n, steps=steps, factor=STRONG).override(**{"time.coupling": coupling})
     run, power = iterate(scene), steps * (1 if coupling == "lagged" else 2)
@@ -162,13 +162,13 @@ def nilpotent(coupling: str, *, n: int = 8, steps: int = 8) -> list[Line]:
     case = f"Lambda for {steps} steps, {coupling}, {STRONG:g} R"
     return [
         check.below(f"{case}, iteration {power}", "reached to rounding", "theory", float(size[power]), SAME),
-        Line(
+        Check(
             f"{case}, iteration {power - 1}", "and not before", "theory", np.inf, float(size[power - 1]), 1e-9, np.inf
         ),
     ]
 
 
-def printed_sign(*, n: int = 8, steps: int = 8) -> list[Line]:
+def printed_sign(*, n: int = 8, steps: int = 8) -> list[Check]:
     """f_zeta = f - zeta, as printed, against the problem and against that with -M."""
     scene = setting("isotropic", n=n, steps=steps)
     run = iterate(scene, sign=-1.0)
@@ -176,12 +176,12 @@ def printed_sign(*, n: int = 8, steps: int = 8) -> list[Line]:
     case = "Lambda with f - zeta as printed, isotropic"
     away = missed(run, solution(scene))
     return [
-        Line(case, "is not the problem's own map", "theory", np.inf, away, 1e-3, np.inf),
+        Check(case, "is not the problem's own map", "theory", np.inf, away, 1e-3, np.inf),
         check.below(case, "but that of -M", "theory", missed(run, solution(opposite)), SAME),
     ]
 
 
-def lines() -> list[Line]:
+def lines() -> list[Check]:
     """All of the above; about 30 s."""
     return [
         *(fixed_point(reading, hot, n=16) for reading in READINGS for hot in (0.0, 10.0)),

@@ -33,16 +33,16 @@ def decoupled(scene: FullScene) -> FullScene:
 
 
 def _right(outcome: str, scene: FullScene) -> None:
-    if outcome != "right":
+    if outcome != "completed":
         raise RuntimeError(f"'{scene.title}' ended: {outcome}")
 
 
 def solution(scene: FullScene) -> Fields:
     """The scene's run with its own coupling. Raises RuntimeError when it does not end right."""
-    job = Simulation(scene)
-    d = job.discretisation
-    found = [(d.field(job.stepper.w), d.field(job.stepper.theta)) for _ in job.steps()]
-    _right(job.outcome, scene)
+    simulation = Simulation(scene)
+    d = simulation.discretisation
+    found = [(d.field(simulation.stepper.w), d.field(simulation.stepper.theta)) for _ in simulation.steps()]
+    _right(simulation.outcome, scene)
     return Fields(np.array([w for w, _ in found]), np.array([theta for _, theta in found]))
 
 

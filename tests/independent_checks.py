@@ -1,4 +1,4 @@
-"""Lines of the verification report from codes that share nothing with the core: python tests/independent_lines.py OUT.csv"""
+"""Checks of the verification report from codes that share nothing with the core: python tests/independent_checks.py OUT.csv"""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ sys.path[:0] = [str(HERE), str(HERE / "core")]
 import test_against_skfem as codes  # noqa: E402
 import test_exact_discrete as exact  # noqa: E402
 
+from warmslip.records import check  # noqa: E402
 from warmslip.studies.refinement_study import stamp  # noqa: E402
-from warmslip.verification import check  # noqa: E402
 
 TITLE = "The same scheme by others: exact rational arithmetic on a few cells, scikit-fem, SciPy"
 
@@ -23,7 +23,7 @@ def main(out: Path) -> None:
     for code, (reading, theta, coupling) in itertools.product(codes.CODES, codes.CASES):
         found += codes.lines(code, reading, theta, coupling)
     check.write(out, found, stamp(None, title=TITLE))
-    print(f"{sum(one.passed for one in found)} of {len(found)} lines")
+    print(f"{sum(one.passed for one in found)} of {len(found)} checks")
 
 
 if __name__ == "__main__":
