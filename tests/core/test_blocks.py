@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.bodies import SMALL, paper, right
+from support.bodies import SMALL, completed, paper
 
 import warmslip
 from warmslip.scene.full import full_model
@@ -33,7 +33,7 @@ def test_an_absent_block_is_one_without_effect(block: str, coupling: str) -> Non
     if block == "heat" and coupling == "monolithic":
         pytest.skip("there is nothing to couple")
     scene = paper(coupling, **ABSENT[block])
-    pruned, whole = right(scene), right(full_model(scene))
+    pruned, whole = completed(scene), completed(full_model(scene))
     for name in ("u", "w", "theta"):
         one, other = getattr(pruned, name), getattr(whole, name)
         if one is None:
@@ -46,7 +46,7 @@ def test_an_absent_block_is_one_without_effect(block: str, coupling: str) -> Non
 def test_without_contact_a_body_is_one_that_never_touches(dim: int) -> None:
     scene = paper() if dim == 2 else warmslip.load("block_3d", ["mesh.n=3", "time.steps=4"])
     scene = scene.override(**{"contact.heat_exchange": None})
-    apart, free = right(scene.override(**{"contact.gap": 9.0})), right(scene.override(contact=None))
+    apart, free = completed(scene.override(**{"contact.gap": 9.0})), completed(scene.override(contact=None))
     for name in ("u", "w", "theta"):
         assert np.abs(getattr(free, name) - getattr(apart, name)).max() <= 1e-12 * np.abs(getattr(apart, name)).max()
 
@@ -63,19 +63,19 @@ def test_heat_alone_is_the_heat_of_a_body_whose_motion_makes_none() -> None:
         "contact.friction",
     )
     still = moving.override(**dict.fromkeys(gone))
-    result = right(still)
+    result = completed(still)
     assert result.u is None
-    assert np.abs(result.theta - right(moving).theta).max() <= 1e-13
+    assert np.abs(result.theta - completed(moving).theta).max() <= 1e-13
 
 
 def test_less_physics_is_less_work() -> None:
     """Counted, not timed: fields, factors, substitutions a step."""
     steps = SMALL["time.steps"]
-    full = right(paper()).summary["cost"]
+    full = completed(paper()).summary["cost"]
     assert (full["factorizations"], full["substitutions"]) == (2, 2 * steps)
-    cold = right(paper(**ABSENT["heat"])).summary["cost"]
+    cold = completed(paper(**ABSENT["heat"])).summary["cost"]
     assert (cold["factorizations"], cold["substitutions"]) == (1, steps)
-    linear = right(paper(**ABSENT["heat"]).override(contact=None)).summary["cost"]
+    linear = completed(paper(**ABSENT["heat"]).override(contact=None)).summary["cost"]
     assert (linear["substitutions"], linear["newton_iterations"], linear["dense_factorizations"]) == (steps, 0, 0)
 
 
@@ -87,7 +87,7 @@ def test_a_cube_without_a_block(block: str) -> None:
         "heat": ("heat", "supports.temperature", "contact.heat_exchange"),
         "motion": (*motion, "contact.stiffness", "contact.friction"),
     }
-    result = right(scene.override(**dict.fromkeys(gone.get(block, (block,)))))
+    result = completed(scene.override(**dict.fromkeys(gone.get(block, (block,)))))
     assert (result.u is None, result.theta is None) == (block == "motion", block == "heat")
 
 

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.bodies import column, right
+from support.bodies import column, completed
 
 import warmslip
+from warmslip.scene.reader import build, load
+from warmslip.scene.scene import Scene
 from warmslip.scene.tables import FrictionTable
 
 
@@ -32,7 +34,7 @@ def test_pressure_of_a_pressed_column(law: dict[str, float], penetration: float,
         loads={"traction": {"top": [0.0, -2.0]}},
         contact={"part": "bottom", "quadrature": quadrature, **law},
     )
-    result = right(scene)
+    result = completed(scene)
     assert result.summary["contact"]["normal_force"] == pytest.approx(2.0, rel=1e-9)
     assert result.summary["contact"]["max_penetration"] == pytest.approx(penetration, rel=1e-9)
 
@@ -47,7 +49,7 @@ def test_a_pressure_limit_lets_the_body_through() -> None:
         loads={"body": [0.0, -1.0 * density]},
         contact={"part": "bottom", "stiffness": 1e4, "pressure_limit": 1.0, "gap": -0.5},
     )
-    result = right(scene)
+    result = completed(scene)
     fall = (1.0 * density * height - 1.0) / (density * height)
     assert result.w[:, 1].mean() == pytest.approx(-fall * k * steps, rel=1e-3)
 
@@ -64,7 +66,7 @@ def sliding(friction: dict[str, float], *, push: float, steps: int = 20, **more:
         contact={"part": "bottom", "stiffness": 1e4, "friction": friction},
         **more,
     )
-    return right(scene)
+    return completed(scene)
 
 
 def test_tresca_does_not_ask_for_pressure() -> None:
@@ -79,10 +81,10 @@ def test_tresca_does_not_ask_for_pressure() -> None:
             loads={"body": [2.0, 0.0]},
             contact={"part": "bottom", "stiffness": 1e4, "gap": gap, "friction": {"cohesion": 0.4}},
         )
-        assert right(scene).w[:, 0].mean() == pytest.approx(0.25 * (1.0 - 0.4) / 0.5, rel=1e-3)
+        assert completed(scene).w[:, 0].mean() == pytest.approx(0.25 * (1.0 - 0.4) / 0.5, rel=1e-3)
         held = scene.override(**{"contact.friction.cohesion": 1.1})
         below = np.isclose(np.asarray(warmslip.discretise(held).mesh.nodes)[:, 1], 0)
-        assert np.abs(right(held).w[below, 0]).max() <= 1e-15  # it tilts, and does not slide
+        assert np.abs(completed(held).w[below, 0]).max() <= 1e-15  # it tilts, and does not slide
 
 
 @pytest.mark.parametrize(
@@ -154,7 +156,7 @@ def test_conductance_by_pressure_is_a_robin_side() -> None:
         "time": {"end": 40.0, "steps": 40},
     }
     ends = [
-        right(column(**common, contact={"part": "bottom", "stiffness": 1e4, "heat_exchange": exchange})).theta
+        completed(column(**common, contact={"part": "bottom", "stiffness": 1e4, "heat_exchange": exchange})).theta
         for exchange in (
             {"conductance": 0.0, "per_pressure": 3.0, "foundation_temperature": 5.0},
             {"conductance": 3.0, "foundation_temperature": 5.0},
@@ -164,3 +166,35 @@ def test_conductance_by_pressure_is_a_robin_side() -> None:
     for theta in ends:
         assert theta.max() == pytest.approx(5.0 - flux / 3, rel=1e-6)
     assert np.abs(ends[0] - ends[1]).max() <= 1e-6
+
+
+def on_a_hole(d: int, friction: dict[str, float], **more: Any) -> Scene:
+    """A body that rubs on the wall of its hole, which no axis is normal to; it leaves the wall and comes back."""
+    body = load("plate_with_hole" if d == 2 else "block_with_hole").mesh.file
+    data: dict[str, Any] = {
+        "mesh": {"file": body},
+        "time": {"end": 4.0, "steps": 4},
+        "elasticity": {"young": 20.0, "poisson": 0.3, "assumption": "plane_stress" if d == 2 else "solid"},
+        "supports": {"displacement": {"top": ["0.01 * sin(1.5 * t)", *["0.0"] * (d - 1)]}},
+        "contact": {"part": "hole", "stiffness": 100.0, "friction": friction},
+    }
+    return build(data).override(**more)
+
+
+@pytest.mark.parametrize("stiffness", [100.0, "rigid"])
+@pytest.mark.parametrize("mu", [1e-4, 1e-6, 1e-9, 1e-14])
+@pytest.mark.parametrize("d", [2, 3])
+def test_hardly_any_friction_on_an_oblique_part(d: int, mu: float, stiffness: float | str) -> None:
+    """A friction bound far below the normal force is known to the rounding of that force."""
+    found = completed(on_a_hole(d, {"coefficient": mu}, **{"contact.stiffness": stiffness}))
+    smooth = completed(on_a_hole(d, {"coefficient": 0.0}, **{"contact.stiffness": stiffness}))
+    scale = np.abs(smooth.u).max()
+    assert np.abs(found.u - smooth.u).max() <= (10 * mu + 1e-12) * scale
+
+
+@pytest.mark.parametrize("stiffness", [100.0, "rigid"])
+@pytest.mark.parametrize("friction", [{"cohesion": 0.01}, {"cohesion": 0.01, "coefficient": 0.3}, {"cohesion": 1e-6}])
+@pytest.mark.parametrize("d", [2, 3])
+def test_cohesion_on_an_oblique_part_that_opens(d: int, friction: dict[str, float], stiffness: float | str) -> None:
+    """Open points that cohesion holds have a normal force of rounding, which stores no energy."""
+    completed(on_a_hole(d, friction, **{"contact.stiffness": stiffness}))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, field, right, scene
+from support.boxes import along, completed, field, scene
 
 from warmslip import Scene
 from warmslip.simulation.simulation import Simulation
@@ -67,7 +67,9 @@ def test_growth_of_the_staggered_coupling(d: int, r: float, k: float, grows: boo
     For R = -M it grows beyond k = 2 A/(M^2 - F) by the splitting. For R = +M it grows beyond M R = F, as the equations do.
     """
     steps, speeds = 200, []
-    right(column(d, r, k, steps), each=lambda simulation, report: speeds.append(float(field(simulation, "w")[0, -1])))
+    completed(
+        column(d, r, k, steps), each=lambda simulation, report: speeds.append(float(field(simulation, "w")[0, -1]))
+    )
     factor = 1 + k * (M * r - F) / (A + k * F)
     assert (abs(factor) > 1) == grows
     assert speeds[-1] / speeds[0] == pytest.approx(factor ** (steps - 1), rel=1e-9)
@@ -91,7 +93,7 @@ SMALL = 1e-5  # the growth is of no size that anything else would see
 def test_growth_is_said(d: int, coupling: str, r: float, k: float, steps: int, cure: str) -> None:
     """Two per cent outside the limit, with the factor a step that the equations have, and what helps."""
     one = column(d, r, k, steps, coupling=coupling, theta=SMALL)
-    words = message(right(one, digits=7.0))
+    words = message(completed(one, digits=7.0))
     strained = k * (M * r - F)
     factor = {
         "staggered": abs(1 + strained / (A + k * F)),
@@ -163,4 +165,4 @@ def test_growth_until_numbers_overflow_is_the_reason(d: int, r: float, k: float,
 def test_a_growth_ends_where_the_step_is_cured(d: int) -> None:
     """What the sentence advises: the very run, monolithic or in steps below the number that it says."""
     for coupling, k in (("monolithic", 1.02 * LIMIT), ("staggered", 0.99 * LIMIT)):
-        assert message(right(column(d, -M, k, 300, coupling=coupling, theta=SMALL))) == ""
+        assert message(completed(column(d, -M, k, 300, coupling=coupling, theta=SMALL))) == ""

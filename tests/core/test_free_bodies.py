@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, elasticity, field, right, scene
+from support.boxes import along, completed, elasticity, field, scene
 from support.ranked import Checks
 
 from warmslip import Scene
@@ -68,7 +68,7 @@ def warm_flight(d: int) -> None:
     for heating in couplings(d):
         for end in (1e-3, 1e4):
             flight = np.asarray(along(d, 10.0, -3.0))
-            simulation = right(
+            simulation = completed(
                 steel(
                     d,
                     4 if d == 2 else 2,
@@ -93,7 +93,7 @@ def warm_and_held_by_contact(d: int) -> None:
     """Statics whatever the coupling, from steps of the waves' transit to some that are a billion times as long."""
     for heating in couplings(d):
         for end in (1e-2, 1.0, 1e4):
-            simulation = right(
+            simulation = completed(
                 steel(
                     d,
                     3,
@@ -111,7 +111,7 @@ def strongly_coupled_and_unsymmetric(d: int) -> None:
     """Steps about as long as the waves' transit, in which mass and springs hold the motions alike: momentum stays."""
     strong = (1e3 * np.array(turned(d))).tolist()
     for end in (1e-6, 1e-5, 1e-4):
-        simulation = right(
+        simulation = completed(
             steel(
                 d,
                 3,
@@ -142,7 +142,7 @@ def slides_without_friction(d: int) -> None:
                     initial={"velocity": along(d, 0.0, 1e-5 / end)},
                     contact={"part": "bottom", "stiffness": 1e6, "friction": {"coefficient": 0.0}},
                 )
-                simulation = right(one.override(**{"time.coupling": coupling}))
+                simulation = completed(one.override(**{"time.coupling": coupling}))
                 assert momentum(simulation)[0] == pytest.approx(MASS[d] * 1e-5 / end, rel=1e-5)
 
 
@@ -163,7 +163,7 @@ def flight_makes_no_heat(d: int) -> None:
                         heat=heated(d, -1e3, capacity=capacity, conductivity=conductivity),
                         initial={"velocity": velocity},
                     )
-                    simulation = right(one, digits=4.0)
+                    simulation = completed(one, digits=4.0)
                     output = summary(simulation)
                     assert output["digits"]["u"] >= 8
                     message = any("the temperature keeps" in words for words in output["warnings"])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.bodies import column, paper, right
+from support.bodies import column, completed, paper
 
 import warmslip
 from warmslip import Scene, _core
@@ -57,7 +57,7 @@ def everything(dim: int, coupling: str) -> Scene:
 def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> None:
     """The books close with all blocks present, contact nodes with held temperature among them, whoever solves."""
     scene = everything(dim, coupling)
-    own = right(scene)
+    own = completed(scene)
     assert own.summary["cost"]["refinements"] == 0  # which would heal a wrong right-hand side
     other = warmslip.run(scene, backend="petsc")
     assert other.outcome == "completed"
@@ -144,7 +144,7 @@ def test_couplings_agree_under_moving_warm_supports() -> None:
                 "supports.temperature": {"top": "2 * t", "left": 0.0, "right": "t * y"},
             },
         )
-        result = right(scene)
+        result = completed(scene)
         return np.concatenate([result.u.ravel(), result.w.ravel(), result.theta])
 
     distances = [np.abs(end("monolithic", n) - end("staggered", n)).max() for n in (8, 16, 32)]
@@ -161,7 +161,7 @@ def test_two_materials_in_series() -> None:
         regions={"upper": {"where": "y > 1", "elasticity": {"lame": [0.0, 3.0]}, "heat": {"conductivity": 5.0}}},
         time={"end": 100.0, "steps": 50},
     )
-    result = right(scene)
+    result = completed(scene)
     top = np.isclose(np.asarray(warmslip.discretise(scene).mesh.nodes)[:, 1], 2.0)
     assert result.u[top, 1] == pytest.approx(1 / 2 + 1 / 6, rel=1e-12)
     assert result.theta.max() == pytest.approx(6.0)
@@ -179,12 +179,12 @@ def test_a_region_with_heat_can_be_read_again(tmp_path: Path) -> None:
 def test_a_full_tensor_is_its_lame_pair() -> None:
     lame = paper(elasticity={"lame": [2.0, 3.0]})
     full = paper(elasticity={"tensor": [[8.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]]})
-    assert np.abs(right(lame).u - right(full).u).max() <= 1e-14
+    assert np.abs(completed(lame).u - completed(full).u).max() <= 1e-14
 
 
 def test_formulas_are_the_constants_they_equal() -> None:
-    plain = right(paper())
-    written = right(
+    plain = completed(paper())
+    written = completed(
         paper(
             **{
                 "loads.body": ["0 * x", "-cos(0 * t)"],
@@ -213,6 +213,6 @@ def test_several_contact_parts_keep_their_laws() -> None:
             {"part": "right", "stiffness": 100.0, "gap": -0.01},
         ],
     )
-    result = right(scene)
+    result = completed(scene)
     # 300 a = 1 + 100 (0.01 - a), the body being stiff
     assert -result.u[:, 0].mean() == pytest.approx((1 + 100 * 0.01) / 400, rel=1e-3)

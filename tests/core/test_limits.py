@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from support.boxes import along, elasticity, field, fields, misses, right, scene
+from support.boxes import along, completed, elasticity, field, fields, misses, scene
 
 import warmslip
 from warmslip import Scene
@@ -38,16 +38,16 @@ def approaches(
 
     At e = `last` no difference is left but round-off.
     """
-    exact = fields(right(limit))
+    exact = fields(completed(limit))
     falls(exact, near, order=order, first=first)
     if last is not None:
-        assert max(misses(fields(right(near(last))), exact).values()) <= 10 * ROUND_OFF
+        assert max(misses(fields(completed(near(last))), exact).values()) <= 10 * ROUND_OFF
 
 
 def falls(exact: dict[str, Any], near: Callable[[float], Scene], *, order: float, first: float) -> None:
     """As `approaches`, of a limit whose fields are known."""
     assert all(np.abs(value).max() > 0 for value in exact.values())
-    large, small = (misses(fields(right(near(e))), exact) for e in (first, first / 10))
+    large, small = (misses(fields(completed(near(e))), exact) for e in (first, first / 10))
     assert max(large.values()) <= 0.1, large
     assert min(small.values()) >= 100 * ROUND_OFF, small
     rates = {name: float(np.log10(large[name] / small[name])) for name in exact}
@@ -89,7 +89,7 @@ def test_friction_to_full_stick(d: int) -> None:
     """
     clamped = squeezed(d)
     plates = {"bottom": [0.0] * d, **clamped.supports.moved}
-    exact = fields(right(clamped.override(**{"supports.displacement": plates})))
+    exact = fields(completed(clamped.override(**{"supports.displacement": plates})))
     simulation, ratios = Simulation(stuck(d, 1e3)), []
     for _, report in simulation.steps():
         assert report.stick == len(simulation.discretisation.surface.weights)
@@ -99,8 +99,8 @@ def test_friction_to_full_stick(d: int) -> None:
     bound = float(np.max(ratios))
     assert 0.1 < bound < 10
     for coefficient in (1.001 * bound, 1e6):
-        assert max(misses(fields(right(stuck(d, coefficient))), exact).values()) <= ROUND_OFF
-    assert misses(fields(right(stuck(d, 0.99 * bound))), exact)["u"] > 1e-6
+        assert max(misses(fields(completed(stuck(d, coefficient))), exact).values()) <= ROUND_OFF
+    assert misses(fields(completed(stuck(d, 0.99 * bound))), exact)["u"] > 1e-6
 
 
 def test_regularised_friction_where_all_slips(d: int) -> None:
@@ -283,7 +283,7 @@ def test_one_huge_step_is_elastic_statics(d: int) -> None:
     """
     cold = {"heat": None, "supports.temperature": [], "contact.heat_exchange": None, "time.steps": 1}
     statics = pushed(d, inertia=None, viscosity=None, **cold)
-    exact = {name: value for name, value in fields(right(statics)).items() if name in ("u", "contact force")}
+    exact = {name: value for name, value in fields(completed(statics)).items() if name in ("u", "contact force")}
     falls(exact, lambda e: pushed(d, **cold, **{"time.end": 1 / e}), order=1, first=1e-3)
 
 
@@ -326,7 +326,7 @@ def test_poisson_to_a_half(d: int) -> None:
             **{"mesh": {"shape": "square", "n": 4, "diagonal": "crisscross"}} if d == 2 else {},
             contact={"part": "bottom", "stiffness": 1e4, "friction": {"coefficient": 0.3}},
         ).override(elasticity=elasticity(d, 100.0, 0.5 - e / 2))
-        simulation = right(one, digits=6)
+        simulation = completed(one, digits=6)
         found.append(
             {
                 "u": field(simulation, "u"),

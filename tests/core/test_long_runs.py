@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, elasticity, field, fields, misses, right, scene
+from support.boxes import along, completed, elasticity, field, fields, misses, scene
 
 from warmslip import Scene, _core
 from warmslip.model.foresight import gradients
@@ -49,7 +49,7 @@ def test_a_pressed_body_stays_where_it_rests(d: int, steps: int) -> None:
         if len(forces.normal) > 200 and len(forces.normal) % 100 == 0:
             worst.append(misses({"u": field(simulation, "u")}, first)["u"])
 
-    right(
+    completed(
         scene(
             d,
             2,
@@ -81,7 +81,7 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
             ).sum(axis=0)
             lost.append(float(np.abs(momentum - 5.0 * velocity).max()))
 
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             2,
@@ -110,7 +110,7 @@ def test_a_body_at_ambient_stays_there(d: int, steps: int, exchange: bool, k: fl
     """Foundation and body have one temperature, or the body is insulated: no step warms it."""
     foundation = {"conductance": 20.0, "foundation_temperature": 293.15}
     contact = {"contact": {"part": "bottom", "heat_exchange": foundation}} if exchange else {}
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             2,
@@ -140,7 +140,7 @@ def test_a_load_that_turns_every_step(d: int) -> None:
             contact={"part": "bottom", "stiffness": 1e6, "gap": 1e-3},
         )
 
-    pressed, lifted = (right(hanging(load, 1)) for load in (-1.0, 1.0))
+    pressed, lifted = (completed(hanging(load, 1)) for load in (-1.0, 1.0))
     assert pressed.report.normal_force > 0.1 and lifted.report.normal_force == 0.0
     turn = []
 
@@ -149,7 +149,7 @@ def test_a_load_that_turns_every_step(d: int) -> None:
         turn.append(misses({"u": field(simulation, "u")}, {"u": field(still, "u")})["u"])
         assert report.normal_force == pytest.approx(still.report.normal_force, rel=ROUND_OFF)
 
-    right(hanging("where(t % 2 > 0.5, -1, 1)", 1001), each=each)
+    completed(hanging("where(t % 2 > 0.5, -1, 1)", 1001), each=each)
     assert len(turn) == 1001 and max(turn) <= ROUND_OFF
 
 
@@ -168,7 +168,7 @@ def test_impact_and_release_every_few_steps(d: int, stiffness: Any) -> None:
             forces(simulation, report)
             heights.append(float(field(simulation, "u")[:, -1].mean()))
 
-        right(
+        completed(
             scene(
                 d,
                 2,
@@ -215,7 +215,7 @@ def test_stick_slip_stick_follows_its_hysteresis(d: int) -> None:
         forces(simulation, report)
         slips.append(report.stick == 0 and report.slip > 0)
 
-    right(one, digits=5.0, each=each)
+    completed(one, digits=5.0, each=each)
     plate_at = way * np.sin(np.pi * np.arange(steps + 1) / 20)
     pull = np.array(forces.tangential)[:, 0]
     spring = (pull[1] - pull[0]) / (plate_at[1] - plate_at[0])
@@ -250,7 +250,7 @@ def test_a_foundation_that_jumps_by_a_million(d: int, capacity: str) -> None:
             supports={"displacement": ["top"], "temperature": {"top": start}},
             contact={"part": "bottom", "heat_exchange": {"conductance": 1e3, "foundation_temperature": foundation}},
         )
-        return {name: value for name, value in fields(right(one)).items() if name != "w"}
+        return {name: value for name, value in fields(completed(one)).items() if name != "w"}
 
     still, jump, both = slab(293.0, 0.0), slab(0.0, 1.0), slab(293.0, 1e6)
     exact = {name: still[name] + 1e6 * jump[name] for name in both}
@@ -300,7 +300,7 @@ def test_slivers_on_a_foundation(d: int, mesh: Callable[[int], Any]) -> None:
     slivers = mesh(d)
     assert slenderest(slivers) >= ASPECT
     r = young * press / (young + c)
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             1,
@@ -336,7 +336,7 @@ def test_a_patch_of_slivers(d: int, mesh: Callable[[int], Any]) -> None:
     axes = ("x", "y", "z")[:d]
     moved = [" + ".join(f"({g!r}) * {axis}" for g, axis in zip(row.tolist(), axes, strict=True)) for row in gradient]
     warmed = " - ".join(axes)
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             1,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, elasticity, field, forces_of, right, scene
+from support.boxes import along, completed, elasticity, field, forces_of, scene
 from support.ranked import Checks
 
 from warmslip.simulation.simulation import Simulation
@@ -30,7 +30,7 @@ def bottom(simulation: Simulation) -> Any:
 def depths_far_below_the_free_motion(d: int) -> None:
     """Every node of one grid cell is held or presses on a foundation 1e12 times as stiff: u is the depth p / c, and no more."""
     for coupling in ("staggered", "monolithic"):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 1,
@@ -59,7 +59,7 @@ def depths_far_below_the_free_motion(d: int) -> None:
 def energy_of_a_stiff_foundation(d: int) -> None:
     """Of depths that are rounding of the displacement, the energy is that of the forces."""
     stiffness = 1e15
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             2,
@@ -79,7 +79,7 @@ def energy_of_a_stiff_foundation(d: int) -> None:
 def a_body_comes_to_rest(d: int) -> None:
     """A block thrown on to a rough foundation stops: what is left of its speed is 1e-11 of it, and has all its digits."""
     for stiffness in (3e9, "rigid"):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 1,
@@ -111,7 +111,7 @@ def loaded_by_supports_alone(d: int) -> None:
             elasticity=elasticity(d, 100.0, 0.3),
             supports={"displacement": {"top": along(d, "-0.01 * t"), "bottom": along(d, 0.0)}},
         ).override(**{"mesh.lengths": [1.0] * (d - 1) + [length]})
-        right(one, digits=13.0 - 1.5 * np.log10(length))
+        completed(one, digits=13.0 - 1.5 * np.log10(length))
 
 
 @check
@@ -127,7 +127,7 @@ def a_warmed_rod(d: int) -> None:
         initial={"temperature": 293.15},
         contact={"part": "bottom", "heat_exchange": {"conductance": 1e3, "foundation_temperature": 393.15}},
     ).override(**{"mesh.lengths": [0.1] * (d - 1) + [1.0]})
-    right(one, digits=5.0)
+    completed(one, digits=5.0)
 
 
 # ---- heat at rest, and of a contact that leads it well ---------------------------------------------------------------
@@ -137,7 +137,7 @@ def a_warmed_rod(d: int) -> None:
 def rest_makes_no_heat(d: int) -> None:
     """Points that stick make no heat at all, nodal or Gauss's, however hard they are pushed."""
     for quadrature in ("nodal", "gauss-2"):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 2,
@@ -163,7 +163,7 @@ def a_contact_that_leads_all_heat(d: int) -> None:
     """A contact of ever better conductance takes the temperature of the foundation, to the digits that doubles leave it."""
     miss = {}
     for per_pressure in (1e4, 1e5, 1e15, 1e18):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 4 if d == 2 else 2,
@@ -196,7 +196,7 @@ def regularised_friction_of_any_sharpness(d: int) -> None:
     answers = {}
     for sharpness in (0.0, 1e-4, 1e-5, 1e-6, 1e-12):
         friction = {"coefficient": 2.0} | ({"regularisation": sharpness} if sharpness else {})
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 1,
@@ -219,7 +219,7 @@ def gauss_points_on_a_rigid_foundation(d: int) -> None:
     for friction in ({}, {"friction": {"coefficient": 0.3}}):
         for supports in ({"displacement": ["top"]}, None):
             tables = {} if supports is None else {"supports": supports}
-            simulation = right(
+            simulation = completed(
                 scene(
                     d,
                     3,
@@ -250,7 +250,7 @@ def shares_beside_a_clamped_edge(d: int) -> None:
     other = Simulation(one, backend="petsc")
     for _ in other.steps():
         pass
-    found, again = forces_of(right(one)), forces_of(other)
+    found, again = forces_of(completed(one)), forces_of(other)
     assert np.abs(found[:, 0]).max() > 1e-4 and np.abs(found - again).max() <= 1e-12 * np.abs(found).max()
 
 
@@ -266,7 +266,7 @@ def shares_of_as_many_points_as_nodes(d: int) -> None:
         loads={"body": along(d, -1e-3)},
         contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-2"},
     )
-    simulation = right(one)
+    simulation = completed(one)
     surface = simulation.discretisation.surface
     found = -forces_of(simulation)[:, -1]
     nodes, places = np.asarray(simulation.discretisation.mesh.nodes), np.asarray(surface.positions)
@@ -297,7 +297,7 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
             supports={"displacement": {"top": along(d, "-0.001 * t", "0.0008 * t")}},
             contact={"part": "bottom", "stiffness": "rigid", "quadrature": "gauss-3"} | friction,
         )
-        simulation, other = right(one), Simulation(one, backend="petsc")
+        simulation, other = completed(one), Simulation(one, backend="petsc")
         for _ in other.steps():
             pass
         found, again = forces_of(simulation), forces_of(other)

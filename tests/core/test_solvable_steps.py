@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
-from support.boxes import along, elasticity, forces_of, right, scene
+from support.boxes import along, completed, elasticity, forces_of, scene
 
 from warmslip.simulation.simulation import Simulation
 
@@ -69,7 +69,7 @@ def frozen_thresholds(posed: Posed, stiffness: float, mu: float) -> Any:
 
 def test_stiff_foundation_in_space() -> None:
     """54 Gauss points, a foundation 5e5 times as stiff as the body, strong friction."""
-    simulation = right(
+    simulation = completed(
         scene(
             3,
             [3, 3, 1],
@@ -95,7 +95,7 @@ def test_stiff_foundation_in_space() -> None:
 @pytest.mark.parametrize(("d", "n", "points"), [(3, 2, "gauss-3"), (2, 5, "gauss-3")])
 def test_rigid_foundation_with_a_curved_gap(d: int, n: int, points: str) -> None:
     """A convex quadratic programme: pressures, depths and their products decide alone whether its solution was found."""
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             [n] * (d - 1) + [1],
@@ -115,7 +115,7 @@ def test_rigid_foundation_with_a_curved_gap(d: int, n: int, points: str) -> None
 
 def test_friction_that_weakens_by_slip() -> None:
     """Two points, one at rest and one that slips, found by trying all statuses."""
-    simulation = right(
+    simulation = completed(
         scene(
             2,
             [1, 3],
@@ -166,7 +166,7 @@ def test_friction_that_weakens_by_slip() -> None:
 
 def test_sharp_regularisation_at_gauss_points() -> None:
     """Three points on two nodes, whose shares friction regularised at 1e-8 of the velocities decides."""
-    simulation = right(
+    simulation = completed(
         scene(
             2,
             1,

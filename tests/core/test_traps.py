@@ -73,4 +73,4 @@ def test_no_step_divides_by_zero_overflows_or_makes_a_nan(tmp_path: Path, ranks:
         timeout=300,
     )
     assert result.returncode == 0, result.stdout + result.stderr
-    assert result.stdout.count(": right") == ranks * len(SCENES)
+    assert result.stdout.count(": completed") == ranks * len(SCENES)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, elasticity, field, right, scene
+from support.boxes import along, completed, elasticity, field, scene
 from support.ranked import Checks
 
 import warmslip
@@ -27,7 +27,7 @@ check = Checks()
 def free_flight(d: int) -> None:
     """No force acts: w stays what it was, in steps far longer than elastic waves need."""
     for end in (4.0, 400.0, 4e6):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 16 if d == 2 else 4,
@@ -45,7 +45,7 @@ def free_flight(d: int) -> None:
 def spin(d: int) -> None:
     """A rigid rotation goes on, in the linear theory as a rotation for ever."""
     turning = ["-(y - 0.05)", "x - 0.05", 0.0][:d]
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             8 if d == 2 else 3,
@@ -65,7 +65,7 @@ def spin(d: int) -> None:
 @check
 def free_fall(d: int) -> None:
     """Gravity alone: backward Euler's w = -g t, u = -g k^2 n (n + 1) / 2, whatever the stiffness."""
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             6 if d == 2 else 3,
@@ -82,7 +82,7 @@ def free_fall(d: int) -> None:
 @check
 def warmed_free(d: int) -> None:
     """A free body is warmed on one side: its centre of mass rests, and it expands."""
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             16 if d == 2 else 4,
@@ -102,7 +102,7 @@ def warmed_free(d: int) -> None:
 @check
 def moving_support_gauss(d: int) -> None:
     """The support's own motion reaches the Gauss points beside it: penetration 0.1 everywhere."""
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             1,
@@ -138,7 +138,7 @@ def contact_heat(d: int) -> None:
         )
         # with the vertex rule a conductance by pressure is lumped at the nodes, a constant one is consistent
         constant = one.override(**{"contact.heat_exchange": {"conductance": 1.0, "foundation_temperature": 1.0}})
-        theta, exact = (field(right(each), "theta") for each in (one, constant))
+        theta, exact = (field(completed(each), "theta") for each in (one, constant))
         assert np.abs(theta - exact).max() <= (1e-7 if quadrature == "gauss-2" else 0.06)
         assert exact.max() > 0.3
 
@@ -167,7 +167,7 @@ def unloading(d: int) -> None:
 
 @check
 def unloaded_at_once(d: int) -> None:
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             2,
@@ -184,7 +184,7 @@ def unloaded_at_once(d: int) -> None:
 @check
 def flight_without_load(d: int) -> None:
     for speed in (1e-6, 1.0, 1e6):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 1,
@@ -222,7 +222,7 @@ def touches_with_zero_force(d: int) -> None:
 def held_by_contact_alone(d: int) -> None:
     """A steel block (mm, t, s) on its foundation, in steps from a tenth of a wave's transit to a million of them: statics."""
     for end in (1e-4, 1e-2, 1.0, 1e4):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 4,
@@ -248,7 +248,7 @@ def quasistatic_on_contact(d: int) -> None:
         loads={"body": along(d, -1.0, "0.1 * t")},
         contact={"part": "bottom", "stiffness": 1e5, "friction": {"coefficient": 0.5}},
     )
-    simulation = right(one)
+    simulation = completed(one)
     assert simulation.report.normal_force == pytest.approx(1.0, rel=1e-12)
     assert np.linalg.norm(simulation.report.friction_traction) == pytest.approx(0.1, rel=1e-12)
     for body in (along(d, 1.0), along(d, -1.0, 0.6)):
@@ -259,7 +259,7 @@ def quasistatic_on_contact(d: int) -> None:
 @check
 def a_warm_body_stays_warm(d: int) -> None:
     """Copper of 1 cm at 293.15 K in steps of an hour, insulated."""
-    simulation = right(
+    simulation = completed(
         scene(
             d,
             32 if d == 2 else 6,
@@ -276,7 +276,7 @@ def a_warm_body_stays_warm(d: int) -> None:
 def cooling(d: int) -> None:
     """Steel cools to its foundation, to 0 as to 20, until squares of temperatures underflow."""
     for ambient in (0.0, 20.0):
-        simulation = right(
+        simulation = completed(
             scene(
                 d,
                 4 if d == 2 else 2,
@@ -302,7 +302,7 @@ def slender(d: int) -> None:
         loads={"traction": {"left": along(d, 0.0, "1e3 * t")}},
         contact={"part": "bottom", "stiffness": 1e9, "gap": 1.0},
     ).override(**{"mesh.lengths": [0.02] * (d - 1) + [1.0]})
-    simulation = right(one, digits=6.0)
+    simulation = completed(one, digits=6.0)
     other = Simulation(one, backend="petsc")
     for _ in other.steps():
         pass
@@ -318,7 +318,7 @@ def stiff_and_rigid(d: int) -> None:
     )
     force = {}
     for stiffness in (1e5, 1e6, 1e7, 1e12, 1e16, "rigid"):
-        simulation = right(base.override(**{"contact.stiffness": stiffness}))
+        simulation = completed(base.override(**{"contact.stiffness": stiffness}))
         assert set(simulation.statistics.stages) <= {"none", "newton"}, simulation.statistics.stages
         force[stiffness] = np.asarray(simulation.stepper.contact_force)
     size, rigid = np.abs(force["rigid"]).max(), force["rigid"]
@@ -347,7 +347,7 @@ def contact_solver_does_not_give_up(d: int) -> None:
                             "friction": {"coefficient": mu},
                         },
                     ).override(**{"mesh.lengths": [5.0, 1.0] if d == 2 else [5.0, 5.0, 1.0]})
-                    right(one)
+                    completed(one)
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import FAR, SIDES, along, axis_of, elasticity, fields, right, scene, turned
+from support.boxes import FAR, SIDES, along, axis_of, completed, elasticity, fields, scene, turned
 from support.ranked import Checks
 
 from warmslip import discretise
@@ -82,11 +82,11 @@ def it_comes_to_its_foundation(d: int) -> None:
         across = "yx"[axis] if d == 2 else "yzx"[axis]
         slope = f"0.01 + 0.02 * {across}" if part not in FAR else 0.02  # beyond the origin a turn slides, too
         for stiffness in (1e3, "rigid"):
-            near = right(free(d, part, load, stiffness=stiffness))
+            near = completed(free(d, part, load, stiffness=stiffness))
             force = np.reshape(near.stepper.contact_force, (-1, d))
             assert np.abs(force.sum(axis=0) - load).max() <= 1e-11
             for gap in (0.01, slope, 50.0):
-                far = right(free(d, part, load, stiffness=stiffness, gap=gap), digits=6.0)
+                far = completed(free(d, part, load, stiffness=stiffness, gap=gap), digits=6.0)
                 there = np.reshape(far.stepper.contact_force, (-1, d))
                 assert np.abs(there - force).max() <= 1e-9, (part, stiffness, gap)
 
@@ -96,7 +96,7 @@ def it_turns_until_two_rows_of_points_hold_it(d: int) -> None:
     """Statics: on a curved foundation the load's centre, 5/9, lies between the rows at 1/2 and 1, that take 4/3 and 1/6."""
     body = [0.0] * (d - 1) + ["-1 - x"]
     for gap in ("0.01 + 0.1 * (x - 0.3)**2", "0.1 * (x - 0.3)**2"):
-        simulation = right(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
+        simulation = completed(free(d, "bottom", body, stiffness="rigid", gap=gap), digits=6.0)
         force = np.reshape(simulation.stepper.contact_force, (-1, d))[:, -1]
         place = np.asarray(simulation.discretisation.surface.positions)[:, 0]
         rows = [-force[np.abs(place - x) < 0.1].sum() for x in (0.0, 0.5, 1.0)]
@@ -163,7 +163,7 @@ def a_stiff_body_on_a_soft_layer(d: int) -> None:
         contact={"part": "bottom", "stiffness": 1e9, "friction": {"coefficient": 0.4}},
     )
     for scale in (1.0, 1.27e3, 0.0321):
-        simulation = right(
+        simulation = completed(
             one.override(
                 **{
                     "mesh.lengths": [0.1 * scale] * d,
@@ -197,7 +197,7 @@ def friction_stops_it_in_one_long_step(d: int) -> None:
         pushed = moving.override(
             **{"initial.velocity": [0.0] * d, "loads.body": along(d, -weight, 0.2 * weight + density * speed / step)}
         )
-        ways = [np.reshape(right(one).stepper.contact_force, (-1, d)) for one in (moving, pushed)]
+        ways = [np.reshape(completed(one).stepper.contact_force, (-1, d)) for one in (moving, pushed)]
         sums = [force.sum(axis=0) for force in ways]
         assert np.abs(sums[0] - sums[1]).max() <= 1e-11 * np.abs(sums[1]).max()
         if d == 2:  # in space several solutions are near
@@ -223,7 +223,7 @@ def a_slab_that_curls_is_held_by_a_point_that_sticks(d: int) -> None:
             "heat_exchange": {"conductance": 10.0},
         },
     }
-    heavy, light = right(build(tables | {"inertia": {"density": 2400.0}})), right(build(tables))
+    heavy, light = completed(build(tables | {"inertia": {"density": 2400.0}})), completed(build(tables))
     for name in ("theta", "contact force"):
         one, other = fields(heavy)[name], fields(light)[name]
         if name == "contact force":  # which of two like points sticks is a tie

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from support.boxes import along, elasticity, field, forces_of, right, scene
+from support.boxes import along, completed, elasticity, field, forces_of, scene
 from support.ranked import Checks
 
 from warmslip.scene.reader import load
@@ -38,7 +38,7 @@ def history(one: Any, units: Units, d: int) -> list[dict[str, Any]]:
         force = forces_of(simulation) / (units.force if d == 3 else units.force / units.length)
         found.append({name: field(simulation, name) / units.field[name] for name in ("u", "w")} | {"force": force})
 
-    right(one, each=keep)
+    completed(one, each=keep)
     return found
 
 
@@ -161,7 +161,7 @@ def a_block_that_slides_on_a_rigid_foundation(d: int) -> None:
 
     def forces(scale: float) -> Any:
         found: list[Any] = []
-        right(
+        completed(
             one.override(**{"mesh.lengths": [scale, scale]}),
             each=lambda simulation, _: found.append(forces_of(simulation)),
         )

@@ -68,7 +68,10 @@ class Scheme:
         """The inverse of S without supports, what takes y to the contact points' (normal, tangential) frame, W = B S^-1 B'."""
         f, k, d = self.forms, self.k, self.d
         momentum, heat = f.inertia / k + f.viscosity + k * f.elasticity, f.storage / k + f.conduction + f.exchange
-        held_w, held_theta = [d * a + c for a in self.prescribed_displacement for c in range(d)], self.prescribed_temperature
+        held_w, held_theta = (
+            [d * a + c for a in self.prescribed_displacement for c in range(d)],
+            self.prescribed_temperature,
+        )
         S, held = momentum, held_w
         if self.coupling == "monolithic":
             S = np.block([[momentum, -f.expansion], [-f.heating, heat]])

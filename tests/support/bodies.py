@@ -26,7 +26,7 @@ def column(height: float = 2.0, **tables: Any) -> Scene:
     return build({key: value for key, value in (data | tables).items() if value is not None})
 
 
-def right(scene: Scene) -> Any:
+def completed(scene: Scene) -> Any:
     """The end of a run whose balances close."""
     result = warmslip.run(scene)
     assert result.outcome == "completed", result.summary["failure"]

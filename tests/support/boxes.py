@@ -50,7 +50,7 @@ def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
     return [first, *[0.0] * (d - 2), last]
 
 
-def right(
+def completed(
     one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Simulation, Any], None] | None = None
 ) -> Simulation:
     """A run that must end right, with so many digits in every field that is more than what rounding makes of the others.

@@ -68,8 +68,9 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const auto of_forces = [&](double force) { return largest > 0 ? force / largest : unlimited; };
     const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
     const double normal = off == 0 ? 0 : std::min(of_forces(off), apart);
-    const double friction =
-        friction_defect<d>(law.friction, bound, f_tau, w_tau, max_bound > 0 ? max_bound : largest, max_speed);
+    // a bound far below the normal force is known to the rounding of that force, which lies askew to the axes
+    const double friction = friction_defect<d>(
+        law.friction, bound, f_tau, w_tau, std::max(max_bound > 0 ? max_bound : largest, 1e-3 * f.norm()), max_speed);
     if (!(normal < unlimited) || !(friction < unlimited)) return unlimited;
     worst = std::max({worst, normal, friction});
   }

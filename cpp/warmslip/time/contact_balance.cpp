@@ -1,4 +1,5 @@
 // The terms of the contact in the balances, with their own interpolation to the contact points.
+#include <cmath>
 #include <map>
 #include <stdexcept>
 
@@ -71,11 +72,16 @@ void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& afte
   const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
   const ContactProblem<d> problem = contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
   double stored_before = 0;
+  // an open point that cohesion holds has a normal force of rounding, which is none
+  const auto normal_force = [&](const Eigen::VectorXd& forces, Eigen::Index i, double penetration) {
+    const double normal = forces.segment<d>(i * d).dot(surface_.normals().row(i).transpose());
+    return penetration < 0 && std::abs(normal) <= 1e-12 * forces.lpNorm<Eigen::Infinity>() ? 0 : normal;
+  };
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose(), w = w_points.template segment<d>(i * d);
     const Point<d> u0 = u0_points.segment<d>(i * d), u1 = u1_points.segment<d>(i * d);
-    const double weight = surface_.weights()[i], lambda = in.contact_force.template segment<d>(i * d).dot(nu),
-                 lambda_old = before.contact_force.template segment<d>(i * d).dot(nu);
+    const double weight = surface_.weights()[i], lambda = normal_force(in.contact_force, i, u1.dot(nu) - after.gap[i]),
+                 lambda_old = normal_force(before.contact_force, i, u0.dot(nu) - before.gap[i]);
     const ContactLaw& law = problem.law(static_cast<std::size_t>(i));
     const NormalCompliance& p = law.compliance;
     const double r1 = p.penetration(lambda / weight, u1.dot(nu) - after.gap[i]),

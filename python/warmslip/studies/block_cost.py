@@ -169,7 +169,8 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     `least` is the least code for what is linear, written for the blocks that are there and no others.
     `linear_over_minimal` is a step without its contact solver and its balances over it: 1 when what is absent costs nothing.
     `step_over_minimal` is the whole step, balances included, over the least code and the contact solver. `_lower` and
-    `_upper` are quartiles. `substitutions`, `products` (of a matrix and a vector) and `newton_iterations` are counted, a step each.
+    `_upper` are quartiles. `substitutions`, `products` (of a matrix and a vector) and `newton_iterations` are counted, a
+    step each.
     """
     product = PETSc.Log.Event("MatMult")
     simulation, model = Simulation(scene(full, chosen)), Simulation(full)

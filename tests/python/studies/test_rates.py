@@ -213,9 +213,9 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
         rows[1] |= change
         return list(verdict(rows, stored)["failed"])
 
-    assert spoil(outcome="contact_not_converged") == ["case runs that did not end right"]
-    assert spoil(residual_law=1e-10) == ["case law identity"]
-    assert spoil(residual_heat=math.nan) == ["case heat identity"]
+    assert spoil(outcome="contact_not_converged") == ["case runs that were not completed"]
+    assert spoil(residual_law=1e-10) == ["case law balance"]
+    assert spoil(residual_heat=math.nan) == ["case heat balance"]
     assert spoil(safeguarded_steps=124) == []  # of 496
     assert spoil(safeguarded_steps=125) == ["case share of safeguarded steps"]
     assert spoil(refinements=1) == ["case refined steps on h >= 1/64"]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import FAR, SIDES, along, axis_of, elasticity, field, right, scene, turned
+from support.boxes import FAR, SIDES, along, axis_of, completed, elasticity, field, scene, turned
 from support.ranked import Checks
 
 import warmslip
@@ -55,8 +55,8 @@ def a_corner_inside_is_refused_on_every_part(d: int) -> None:
 @check
 def its_cures_are_cures(d: int) -> None:
     for key, value in (("gap", 0.02), ("gap", 0.021), ("stiffness", 100.0)):
-        right(held(d, "bottom", "left", 0.02, **{"gap": 0.005} | {key: value}))
-    right(held(d, "bottom", "left", -0.02, gap=0.0))
+        completed(held(d, "bottom", "left", 0.02, **{"gap": 0.005} | {key: value}))
+    completed(held(d, "bottom", "left", -0.02, gap=0.0))
     soft = {
         "bottom": warmslip.Law(compliance=lambda r: (100.0 * max(r, 0.0), 100.0 * (r > 0), 50.0 * max(r, 0.0) ** 2))
     }
@@ -89,7 +89,7 @@ def a_run_ends_at_the_step_that_brings_it_inside(d: int) -> None:
         kept, before = field(simulation, "u"), Simulation(one.override(**{"time.end": 0.5, "time.steps": 2}))
         assert len(list(before.steps())) == 2 and before.outcome == "completed"
         assert np.abs(kept - field(before, "u")).max() <= 1e-14
-    right(held(d, "bottom", "left", "t / 50", gap=0.02))
+    completed(held(d, "bottom", "left", "t / 50", gap=0.02))
 
 
 @check
@@ -105,7 +105,7 @@ def gauss_points_count_where_all_their_nodes_are_held(d: int) -> None:
     mesh = kind.from_lists(nodes, box.cells, parts)
     with pytest.raises(ValueError, match=r"holds 'bottom' 0\.015 inside"):
         discretise(one, mesh=mesh)
-    right(held(d, "bottom", "left", 0.02, gap=0.005, quadrature=rule))  # the edge alone is held
+    completed(held(d, "bottom", "left", 0.02, gap=0.005, quadrature=rule))  # the edge alone is held
 
 
 @check
@@ -122,13 +122,13 @@ def a_wall_beside_its_support(d: int) -> None:
             loads={"body": along(d, -1e-3)},
             contact={"part": "left"} | rigid,
         )
-        right(one)
-        level = right(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}))
+        completed(one)
+        level = completed(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}))
         for angle in (0.3, 1.0):
             turn = np.eye(d)
             turn[np.ix_([0, -1], [0, -1])] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
             again, mesh = turned(one.override(**{"supports.displacement": ["right"], "contact.part": "bottom"}), turn)
-            simulation = right(again, mesh=mesh)
+            simulation = completed(again, mesh=mesh)
             assert simulation.report.normal_force == pytest.approx(level.report.normal_force, rel=1e-9)
 
 
@@ -144,7 +144,7 @@ def a_support_that_meets_its_foundation_to_one_rounding(d: int) -> None:
             supports={"displacement": {"top": along(d, "-(0.1 + 0.2)")}},
             contact={"part": "bottom", "stiffness": "rigid", "gap": 0.3, "quadrature": quadrature},
         )
-        assert right(one, digits=4.0).report.normal_force <= 1e-15
+        assert completed(one, digits=4.0).report.normal_force <= 1e-15
 
 
 @check
@@ -160,7 +160,7 @@ def a_support_that_moves_until_it_meets_its_foundation(d: int) -> None:
                 supports={"displacement": {"top": along(d, f"-0.1 * t / {end}")}},
                 contact={"part": "bottom", "stiffness": "rigid", "gap": 0.1, "quadrature": quadrature},
             )
-            assert right(one, digits=4.0).report.normal_force <= 1e-15
+            assert completed(one, digits=4.0).report.normal_force <= 1e-15
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
