@@ -56,7 +56,7 @@ if [[ $(cat "$venv/.base" 2>/dev/null) != "$base" ]]; then
 fi
 
 # the package is installed anew when its metadata changes; its C++ is rebuilt at import when a source changes
-stamp=$(sha256sum <"$root/pyproject.toml")
+stamp=$( (cat "$root/pyproject.toml" && grep '^project(' "$root/CMakeLists.txt") | sha256sum)
 if [[ $(cat "$venv/.stamp" 2>/dev/null) != "$stamp" ]]; then
   log "compiling warmslip and installing what it needs (about five minutes of CPU, no output until it is done)"
   # a petsc4py built against NumPy 1 cannot be loaded beside NumPy 2

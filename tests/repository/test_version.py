@@ -1,0 +1,23 @@
+"""The version stands in CMakeLists.txt; what repeats it agrees."""
+
+from __future__ import annotations
+
+import re
+from importlib import metadata
+
+from support.folders import ROOT
+from support.processes import Command
+
+import warmslip
+
+VERSION = re.findall(r"^project\(\w+ VERSION ([0-9.]+) ", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[0]
+
+
+def test_the_package_and_the_citation_agree() -> None:
+    assert metadata.version("warmslip") == warmslip.__version__ == VERSION
+    assert re.findall(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE) == [VERSION]
+
+
+def test_the_command_prints_it(command: Command) -> None:
+    result = command("--version")
+    assert (result.returncode, result.stdout) == (0, f"warmslip {VERSION}\n"), result.stderr
