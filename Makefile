@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope
+.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope wheel
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -46,6 +46,9 @@ envelope: setup  ## how far each datum of five scenes can be moved (ARGS: --scen
 
 docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)
+
+wheel:  ## the wheel built, installed into a fresh environment and used from an empty folder (five minutes of CPU)
+	@bash tests/wheel.sh
 
 lint: setup  ## format, style, types and layers
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports
