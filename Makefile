@@ -50,9 +50,10 @@ docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, e
 wheel:  ## the wheel built, installed into a fresh environment and used from an empty folder (five minutes of CPU)
 	@bash tests/wheel.sh
 
-lint: setup  ## format, style, types and layers
+lint: setup  ## format, style, types, layers and spelling
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports
 	@$(env) snakefmt --check Snakefile workflows
+	@$(env) git ls-files -z ':!results' ':!tests/fuzz/corpus' | xargs -0 codespell
 	@if command -v clang-format >/dev/null; then \
 	  git ls-files '*.cpp' '*.hpp' | xargs -r clang-format --dry-run --Werror; \
 	else echo "clang-format is not installed: C++ format not checked"; fi
