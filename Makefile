@@ -50,10 +50,14 @@ docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, e
 wheel:  ## the wheel built, installed into a fresh environment and used from an empty folder (five minutes of CPU)
 	@bash tests/wheel.sh
 
-lint: setup  ## format, style, types, layers and spelling
+lint: setup  ## format, style, types, layers, spelling, and files that services read
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports
 	@$(env) snakefmt --check Snakefile workflows
 	@$(env) git ls-files -z ':!results' ':!tests/fuzz/corpus' | xargs -0 codespell
+	@$(env) check() { check-jsonschema --builtin-schema "vendor.$$1" "$${@:2}"; } && \
+	  check github-workflows .github/workflows/*.yml && check dependabot .github/dependabot.yml && \
+	  check github-issue-forms .github/ISSUE_TEMPLATE/[^c]*.yml && check github-issue-config .github/ISSUE_TEMPLATE/config.yml && \
+	  check readthedocs .readthedocs.yaml && check citation-file-format CITATION.cff
 	@if command -v clang-format >/dev/null; then \
 	  git ls-files '*.cpp' '*.hpp' | xargs -r clang-format --dry-run --Werror; \
 	else echo "clang-format is not installed: C++ format not checked"; fi
