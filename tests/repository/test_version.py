@@ -18,6 +18,11 @@ def test_the_package_and_the_citation_agree() -> None:
     assert re.findall(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE) == [VERSION]
 
 
+def test_the_changelog_ends_its_news_with_it() -> None:
+    headings = re.findall(r"^## \[(.*)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert headings[:2] == ["Unreleased", VERSION]
+
+
 def test_the_command_prints_it(command: Command) -> None:
     result = command("--version")
     assert (result.returncode, result.stdout) == (0, f"warmslip {VERSION}\n"), result.stderr
