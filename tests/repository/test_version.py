@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from importlib import metadata
 
+import yaml
 from support.folders import ROOT
 from support.processes import Command
 
@@ -21,6 +22,10 @@ def test_the_package_and_the_citation_agree() -> None:
 def test_the_changelog_ends_its_news_with_it() -> None:
     headings = re.findall(r"^## \[(.*)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert headings[:2] == ["Unreleased", VERSION]
+
+
+def test_the_recipe_for_conda_repeats_it() -> None:
+    assert yaml.safe_load((ROOT / "conda" / "recipe.yaml").read_text())["context"]["version"] == VERSION
 
 
 def test_the_command_prints_it(command: Command) -> None:
