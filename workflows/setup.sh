@@ -42,7 +42,7 @@ if [[ $(cat "$venv/.base" 2>/dev/null) != "$base" ]]; then
   site=()
   "$python" -c 'import petsc4py.PETSc, mpi4py.MPI' 2>/dev/null && site=(--system-site-packages)
   "$python" -m venv --clear ${site[@]+"${site[@]}"} "$venv"
-  pip install setuptools wheel 'scikit-build-core>=0.11' 'pybind11>=2.13' ninja
+  pip install setuptools wheel 'scikit-build-core>=1.0' 'pybind11>=2.13' ninja
   if [[ ! -v site[0] ]]; then
     log "compiling petsc4py for this PETSc (about two minutes)"
     version=$(PKG_CONFIG_PATH=${PETSC_DIR:-}/${PETSC_ARCH:-}/lib/pkgconfig:${PETSC_DIR:-}/lib/pkgconfig:${PKG_CONFIG_PATH:-} \
