@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope
+.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope wheel
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -47,9 +47,17 @@ envelope: setup  ## how far each datum of five scenes can be moved (ARGS: --scen
 docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)
 
-lint: setup  ## format, style, types and layers
+wheel:  ## the wheel built, installed into a fresh environment and used from an empty folder (five minutes of CPU)
+	@bash tests/wheel.sh
+
+lint: setup  ## format, style, types, layers, spelling, and files that services read
 	@$(env) ruff check . && ruff format --check . && mypy && lint-imports
 	@$(env) snakefmt --check Snakefile workflows
+	@$(env) git ls-files -z ':!results' ':!tests/fuzz/corpus' | xargs -0 codespell
+	@$(env) check() { check-jsonschema --builtin-schema "vendor.$$1" "$${@:2}"; } && \
+	  check github-workflows .github/workflows/*.yml && check dependabot .github/dependabot.yml && \
+	  check github-issue-forms .github/ISSUE_TEMPLATE/[^c]*.yml && check github-issue-config .github/ISSUE_TEMPLATE/config.yml && \
+	  check readthedocs .readthedocs.yaml && check citation-file-format CITATION.cff
 	@if command -v clang-format >/dev/null; then \
 	  git ls-files '*.cpp' '*.hpp' | xargs -r clang-format --dry-run --Werror; \
 	else echo "clang-format is not installed: C++ format not checked"; fi

@@ -42,7 +42,7 @@ if [[ $(cat "$venv/.base" 2>/dev/null) != "$base" ]]; then
   site=()
   "$python" -c 'import petsc4py.PETSc, mpi4py.MPI' 2>/dev/null && site=(--system-site-packages)
   "$python" -m venv --clear ${site[@]+"${site[@]}"} "$venv"
-  pip install setuptools wheel 'scikit-build-core>=0.11' 'pybind11>=2.13' ninja
+  pip install setuptools wheel 'scikit-build-core>=1.0' 'pybind11>=2.13' ninja
   if [[ ! -v site[0] ]]; then
     log "compiling petsc4py for this PETSc (about two minutes)"
     version=$(PKG_CONFIG_PATH=${PETSC_DIR:-}/${PETSC_ARCH:-}/lib/pkgconfig:${PETSC_DIR:-}/lib/pkgconfig:${PKG_CONFIG_PATH:-} \
@@ -56,7 +56,7 @@ if [[ $(cat "$venv/.base" 2>/dev/null) != "$base" ]]; then
 fi
 
 # the package is installed anew when its metadata changes; its C++ is rebuilt at import when a source changes
-stamp=$(sha256sum <"$root/pyproject.toml")
+stamp=$( (cat "$root/pyproject.toml" && grep '^project(' "$root/CMakeLists.txt") | sha256sum)
 if [[ $(cat "$venv/.stamp" 2>/dev/null) != "$stamp" ]]; then
   log "compiling warmslip and installing what it needs (about five minutes of CPU, no output until it is done)"
   # a petsc4py built against NumPy 1 cannot be loaded beside NumPy 2

@@ -8,6 +8,7 @@ result = warmslip.run(scene, out="results/runs/first")
 from __future__ import annotations
 
 import importlib
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from warmslip.scene.errors import SceneError
@@ -37,6 +38,8 @@ __all__ = [
     "load",
     "run",
 ]
+
+__version__ = metadata.version("warmslip")
 
 # the compiled core is loaded when it is first needed: scenes can be read and checked without it
 _LAZY = {

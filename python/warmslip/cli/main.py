@@ -7,6 +7,7 @@ import logging
 import os
 import re
 import sys
+from importlib import metadata
 from typing import Annotated, Any
 
 import typer
@@ -22,9 +23,18 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 LEVELS = ("debug", "info", "warning", "error")
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"warmslip {metadata.version('warmslip')}")
+        raise typer.Exit
+
+
 @app.callback()
 def logged(
     log: Annotated[str, typer.Option(help="debug (every step), info (the solver), warning or error")] = "warning",
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
+    ] = False,
 ) -> None:
     if log not in LEVELS:
         raise SceneError(f"--log '{log}' is unknown; use {', '.join(LEVELS)}")

@@ -22,8 +22,11 @@ SOLVING = ("mesh", "scene", "records", "model", "io", "simulation")
 
 @cache
 def _git(*arguments: str) -> str | None:
+    """What git says of the checkout; None where there is none, or where the package is installed inside a foreign one."""
+    git = ("git", "-C", str(PACKAGE))
     try:
-        result = subprocess.run(["git", "-C", str(PACKAGE), *arguments], capture_output=True, text=True, check=True)
+        subprocess.run([*git, "ls-files", "--error-unmatch", "__init__.py"], capture_output=True, check=True)
+        result = subprocess.run([*git, *arguments], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return None
     return result.stdout.strip()
