@@ -19,7 +19,7 @@ TITLE = "The same scheme by others: exact rational arithmetic on a few cells, sc
 
 
 def main(out: Path) -> None:
-    found = [one for name, case in exact.CASES.items() for one in exact.march(name, case)[0]]
+    found = [one for name, case in exact.CASES.items() for one in exact.advance(name, case)[0]]
     for code, (reading, theta, coupling) in itertools.product(codes.CODES, codes.CASES):
         found += codes.lines(code, reading, theta, coupling)
     check.write(out, found, stamp(None, title=TITLE))

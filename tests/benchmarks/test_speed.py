@@ -109,7 +109,7 @@ def test_step_against_scipy(benchmark: Benchmark, warn: Callable[..., None]) -> 
     """The time loops of this core and of the SciPy scheme at h = 1/128, interleaved; the same answer.
 
     SciPy's loop is written twice: plainly (factored once, two solves a step with K), and with K^-1 P stored as a dense
-    matrix, the fastest variant found. Ours closes the books of every step, theirs do not.
+    matrix, the fastest variant found. Ours closes the balances of every step, theirs do not.
     """
     n = steps = 128
     seconds: dict[str, list[float]] = {"ours": [], "plain": [], "stored": []}

@@ -98,7 +98,7 @@ class Judge:
         self.initial = self.scheme.start()
         self.ways: set[str] = set()
 
-    def march(self, guesses: list[Any] | None = None) -> list[State]:
+    def advance(self, guesses: list[Any] | None = None) -> list[State]:
         """The states of the reference, the initial one first; `guesses` are contact forces (points, d) of the first steps."""
         states = [self.initial]
         for n in range(1, self.scene.time.steps + 1):
@@ -110,7 +110,7 @@ class Judge:
     def another(self) -> list[State]:
         """The states without the run's forces to start from; none where no solution is found."""
         try:
-            return self.march()
+            return self.advance()
         except ArithmeticError:
             return [self.initial]
 
@@ -217,7 +217,7 @@ class Judge:
         for seed in range(2):
             try:
                 other = Judge(nudged(self.scene, seed))
-                moved = other.fields(other.march([s.force for s in reference[1:]]))
+                moved = other.fields(other.advance([s.force for s in reference[1:]]))
             except (ArithmeticError, SceneError):
                 return dict.fromkeys(FIELDS, float("inf"))
             found = self.apart(moved, fields, scales)
@@ -268,7 +268,7 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
     it = Judge(scene)
     own, _ = it.own(ran)
     try:
-        reference = it.march([s.force for s in own[1:]])
+        reference = it.advance([s.force for s in own[1:]])
     except ArithmeticError as error:
         return row | {"class": "unjudged", "way": str(error), "judge_seconds": time.perf_counter() - began}
     mine, fields = it.fields(own), it.fields(reference)

@@ -109,7 +109,7 @@ def verdict(right: Scene, ran: judge.Ran) -> dict[str, Any]:
 @pytest.mark.parametrize("name", EXACT)
 def test_reference_is_exact(name: str) -> None:
     case = exact_cases.CASES[name]
-    for state, expected in zip(Scheme(case.scene()).march(), case.states[1:], strict=True):
+    for state, expected in zip(Scheme(case.scene()).advance(), case.states[1:], strict=True):
         for field in ("u", "w", "theta"):
             right = exact_numbers.floats(getattr(expected, field))
             assert np.abs(floats(getattr(state, field)) - right).max() <= 1e-15 * np.abs(right).max(), field
@@ -121,7 +121,7 @@ def test_the_path_leads_to_a_solution_where_newton_cycles(name: str) -> None:
     contact, *_ = scheme.reduced(scheme.start(), 1)
     lam = path(contact)
     assert lam is not None and contact.defect(lam, contact.velocity(lam)) < LAW
-    for state in scheme.march():  # raises where a step is not solved
+    for state in scheme.advance():  # raises where a step is not solved
         assert state.way in ("newton", "path")
 
 
@@ -130,7 +130,7 @@ def test_reference_against_scipy(coupling: str) -> None:
     theirs = scipy_scheme.simulate("printed", 10.0, 4, 4, coupling)
     keys = {"mesh.n": 4, "time.steps": 4, "time.coupling": coupling}
     own = warmslip.load("paper_printed").override(**keys, **{"contact.heat_exchange.foundation_temperature": 10.0})
-    for n, state in enumerate(Scheme(own).march(), start=1):
+    for n, state in enumerate(Scheme(own).advance(), start=1):
         for field in ("u", "w", "theta"):
             right = getattr(theirs, field)
             assert np.abs(floats(getattr(state, field)) - right[n]).max() <= 1e-12 * np.abs(right).max(), field
@@ -149,7 +149,7 @@ def test_warmslip_is_the_reference(name: str) -> None:
     assert len(shared) == len(ran.positions)
     if there.supports.displacement:
         assert len(it.scheme.points) == len(shared)
-    touched = {state.way for state in it.march()[1:]}
+    touched = {state.way for state in it.advance()[1:]}
     assert touched <= {"newton", "path", "tangents"} and len(own) == there.time.steps + 1
 
 

@@ -52,7 +52,7 @@ def lines(case: str, scheme: Scheme, simulation: Simulation, state: State) -> li
     ]
 
 
-def march(name: str, case: Case) -> tuple[list[Check], list[str]]:
+def advance(name: str, case: Case) -> tuple[list[Check], list[str]]:
     """Both codes side by side: the lines of all steps and the stages of the core's contact solver."""
     scheme, simulation, found, stages = case.scheme, case.run(), [], []
     reports = (report for _, report in simulation.steps())
@@ -76,7 +76,7 @@ def check(found: list[Check]) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_core_returns_the_exact_answer(name: str) -> None:
-    found, _ = march(name, CASES[name])
+    found, _ = advance(name, CASES[name])
     check(found)
 
 
@@ -124,7 +124,7 @@ def test_the_exact_answer_obeys_the_inequality(name: str) -> None:
 @pytest.mark.parametrize("name", CYCLES)
 def test_where_newton_once_cycled_it_finds_the_only_answer(name: str) -> None:
     """With the threshold of the pressure in place of that of the unknown force, Newton's method cycled here."""
-    found, stages = march(name, CYCLES[name])
+    found, stages = advance(name, CYCLES[name])
     check(found)
     assert set(stages) <= {"none", "newton"}
 

@@ -55,7 +55,7 @@ def everything(dim: int, coupling: str) -> Scene:
 @pytest.mark.parametrize("coupling", ["staggered", "lagged", "monolithic"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_everything_at_once_by_two_linear_algebras(dim: int, coupling: str) -> None:
-    """The books close with all blocks present, contact nodes with held temperature among them, whoever solves."""
+    """The balances close with all blocks present, contact nodes with held temperature among them, whoever solves."""
     scene = everything(dim, coupling)
     own = completed(scene)
     assert own.summary["cost"]["refinements"] == 0  # which would heal a wrong right-hand side

@@ -120,7 +120,7 @@ def test_perfect_exchange_holds_the_foundation_temperature() -> None:
 
 
 def test_moving_gap() -> None:
-    """A foundation that comes and goes: the work of the gap closes the books."""
+    """A foundation that comes and goes: the work of the gap closes the balances."""
     one = scene("isotropic", time__steps=16)
     loads = replace(Loads.of(one), gap=lambda x, t: 1e-3 * np.sin(9 * t) + 1e-3 * x[:, 0])
     check(one, loads=loads)

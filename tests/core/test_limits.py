@@ -164,10 +164,10 @@ def test_conductance_to_a_given_temperature(d: int) -> None:
     }
     cold = {"displacement": ["top"], "temperature": {"top": 0.0}}
     foundation = {"conductance": 1.0, "foundation_temperature": 10.0}
-    led = scene(d, 4, **warm, supports=cold, contact={"part": "bottom", "heat_exchange": foundation})
+    conducted = scene(d, 4, **warm, supports=cold, contact={"part": "bottom", "heat_exchange": foundation})
     approaches(
         scene(d, 4, **warm, supports=cold | {"temperature": {"top": 0.0, "bottom": 10.0}}),
-        lambda e: led.override(**{"contact.heat_exchange.conductance": 1 / e}),
+        lambda e: conducted.override(**{"contact.heat_exchange.conductance": 1 / e}),
         order=1,
     )
 

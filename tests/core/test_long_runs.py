@@ -104,7 +104,7 @@ def test_a_free_body_keeps_its_momentum(d: int, steps: int) -> None:
 @pytest.mark.parametrize(
     ("exchange", "k"),
     [(True, 0.1), (False, 1e-3), (False, 1e3)],
-    ids=["led", "insulated, short steps", "insulated, long steps"],
+    ids=["conducted", "insulated, short steps", "insulated, long steps"],
 )
 def test_a_body_at_ambient_stays_there(d: int, steps: int, exchange: bool, k: float) -> None:
     """Foundation and body have one temperature, or the body is insulated: no step warms it."""

@@ -55,8 +55,8 @@ class Fault(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Changes with the fault."""
-        return hashlib.sha256("\0".join((self.file, self.old, self.new)).encode()).hexdigest()[:8]
+        """Changes with the fault, and not with the place of its file."""
+        return hashlib.sha256("\0".join((self.old, self.new)).encode()).hexdigest()[:8]
 
 
 class Found(NamedTuple):
@@ -259,8 +259,8 @@ def main() -> int:
 
 def commit() -> str:
     """The commit that is checked out, eight digits."""
-    told = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return told[:8]
+    answer = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return answer[:8]
 
 
 def handful(all_: list[Fault], count: int) -> list[Fault]:

@@ -108,7 +108,7 @@ class Case:
     @cached_property
     def states(self) -> list[State]:
         """The exact states, the initial one first."""
-        return [self.scheme.start(), *self.scheme.march()]
+        return [self.scheme.start(), *self.scheme.advance()]
 
     def run(self, **more: Any) -> Simulation:
         """The core on this case, not yet stepped."""

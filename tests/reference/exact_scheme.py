@@ -95,7 +95,7 @@ class Scheme:
         u[self.prescribed_displacement], w[self.prescribed_displacement], theta[self.prescribed_temperature] = 0, 0, 0
         return State(u, w, theta)
 
-    def march(self) -> Iterator[State]:
+    def advance(self) -> Iterator[State]:
         """All steps, each after the first solution of the one before."""
         state = self.start()
         for _ in range(self.steps):

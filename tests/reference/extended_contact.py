@@ -161,12 +161,14 @@ class Contact:
             moving = v[q, t] / speed if above(speed) else zeros(d - 1)
             wider_velocity = omega * by_speed * moving
             if law.smear is not None:
-                blunt = (speed * speed + law.smear * law.smear).sqrt()
-                along = v[q, t] / blunt
+                smoothed_speed = (speed * speed + law.smear * law.smear).sqrt()
+                along = v[q, t] / smoothed_speed
                 F[q, t] = lam[q, t] - T * along
                 by_force[q, t, t] = one
                 by_force[q, t, 0] = -along * wider_force
-                by_velocity[q, t, t] = -T / blunt * (one - np.outer(along, along)) - np.outer(along, wider_velocity)
+                by_velocity[q, t, t] = -T / smoothed_speed * (one - np.outer(along, along)) - np.outer(
+                    along, wider_velocity
+                )
                 continue
             beta = self.beta[q]
             trial = lam[q, t] + beta * v[q, t]
@@ -247,8 +249,8 @@ class Contact:
             slip = norm(v[q, 1:])
             T = omega * law.bound(p, slip)[0]
             if law.smear is not None:
-                blunt = (slip * slip + law.smear * law.smear).sqrt()
-                found.append(norm(tangential - T / blunt * v[q, 1:]) / force)
+                smoothed_speed = (slip * slip + law.smear * law.smear).sqrt()
+                found.append(norm(tangential - T / smoothed_speed * v[q, 1:]) / force)
             elif law.rubs or largest(tangential):
                 found.append(max(norm(tangential) - T, ZERO, key=float) / force)
                 if above(speed):

@@ -213,9 +213,9 @@ class Scheme:
 
     def contact_heat(self, new: State, n: int) -> tuple[Big, Big]:
         """Matrix (N, N) and vector (N,) of the heat that the contact leads by its pressure and makes by friction."""
-        led, made = zeros(self.N, self.N), zeros(self.N)
+        conducted, made = zeros(self.N, self.N), zeros(self.N)
         if not any(c.heats for c in self.scene.contacts):
-            return led, made
+            return conducted, made
         outside, lam = self.on_points("foundation_temperature", n * self.scene.step), self._local(new.force)
         v = times(self.shape, new.w.ravel()).reshape(-1, self.d)
         for q, point in enumerate(self.points):
@@ -223,9 +223,9 @@ class Scheme:
             exchange, heating = contact.heat_exchange, contact.friction_heating
             h = big(exchange.per_pressure if exchange else 0.0) * lam[q, 0]
             rubbed = big(heating.share if heating else 0.0) * (lam[q, 1:] @ v[q, 1:])
-            led[np.ix_(point.nodes, point.nodes)] += h * np.outer(point.shape, point.shape)
+            conducted[np.ix_(point.nodes, point.nodes)] += h * np.outer(point.shape, point.shape)
             made[point.nodes] += (h * outside[q] + rubbed) * point.shape
-        return led, made
+        return conducted, made
 
     def _heat_right(self, old: State, new: State, source: Big) -> Big:
         if self.forms.heating is None:
@@ -233,9 +233,9 @@ class Scheme:
         return source + times(matrix(self.forms.heating), (old if self.coupling == "lagged" else new).w.ravel())
 
     def _temperature(self, old: State, new: State, n: int, theta: Big) -> Big:
-        led, made = self.contact_heat(new, n)
+        conducted, made = self.contact_heat(new, n)
         _, source = self.right_side(old, n)
-        H, free = self.heat + led, self.free_theta
+        H, free = self.heat + conducted, self.free_theta
         right = mid(self._heat_right(old, new, source) + made - times(matrix(H), theta))
         out = theta.copy()
         out[free] = solve(mid(H[np.ix_(free, free)]), right[free])
@@ -270,8 +270,8 @@ class Scheme:
                 v = times(self.shape, new.w.ravel()).reshape(-1, d)
                 out["law"] = self.contact(old, n, mid(v)).defect(self._local(new.force), v)
         if f.conducts:
-            led, made = self.contact_heat(new, n)
-            terms = [times(matrix(self.heat + led), new.theta), -self._heat_right(old, new, source), -made]
+            conducted, made = self.contact_heat(new, n)
+            terms = [times(matrix(self.heat + conducted), new.theta), -self._heat_right(old, new, source), -made]
             free = self.free_theta
             out["heat"] = relative(largest(sum(terms)[free]), max(map(largest, terms), key=float))
             held = [i for i in range(self.N) if i not in set(free)]
@@ -291,7 +291,7 @@ class Scheme:
                 found.append(factor * largest(matrix_) * largest(field))
         return max(found, key=float)
 
-    def march(self) -> Iterator[State]:
+    def advance(self) -> Iterator[State]:
         """All states after the initial one."""
         state = self.start()
         for n in range(1, self.scene.time.steps + 1):

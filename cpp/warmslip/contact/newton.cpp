@@ -154,7 +154,7 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   }
   tangent.bottomRightCorner(m, m) = rigid_unit_ * rigid_.inertia;
   tangent.bottomRightCorner(m, m).diagonal().array() += lent_mass_;
-  // anew: Eigen's matrices lose their memory when they grow and cannot
+  // allocated again: Eigen's matrices lose their memory when they grow and cannot
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body

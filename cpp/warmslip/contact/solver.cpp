@@ -77,9 +77,9 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     return massive && force.isZero(0) ? moving(false, few_steps) : newton(problem, true, solution);
   });
   if (massive)
-    for (const auto& [carries, anew] : {std::pair{true, false}, std::pair{true, true}, std::pair{false, true}})
-      attempt(Stage::restart, [&, carries = carries, anew = anew] {
-        if (anew) solution.added = none;
+    for (const auto& [carries, afresh] : {std::pair{true, false}, std::pair{true, true}, std::pair{false, true}})
+      attempt(Stage::restart, [&, carries = carries, afresh = afresh] {
+        if (afresh) solution.added = none;
         return moving(carries, options_.newton_steps);
       });
   if (rigid_.count() > 0)  // it may have to come to the foundation first

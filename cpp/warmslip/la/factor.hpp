@@ -36,7 +36,7 @@ class Factor {
 
   /// x = K^-1 r.
   void solve(Vec r, Vec x);
-  /// Whether K was said to be symmetric, and x = K^-T r.
+  /// Whether K was declared symmetric, and x = K^-T r.
   virtual bool symmetric() const { return true; }
   virtual void solve_transposed(Vec r, Vec x) { solve(r, x); }
   int substitutions() const { return substitutions_; }  ///< forward and backward pairs so far

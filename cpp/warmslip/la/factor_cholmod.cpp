@@ -199,7 +199,7 @@ class CholmodFactor final : public Factor {
     }
   }
 
-  // One honest solve: without pivoting an indefinite matrix may lose digits.
+  // One solve as a test: without pivoting an indefinite matrix may lose digits.
   bool accurate(Mat k) {
     VecHandle b, x;
     WARMSLIP_PETSC(MatCreateVecs(k, x.out(), b.out()));

@@ -10,7 +10,7 @@ namespace {
 
 [[noreturn]] void refuse(const char* sentence) { throw std::invalid_argument(sentence); }
 
-// Kuhn's cut of a brick: one simplex for each order in which a path climbs from the lowest to the highest corner.
+// Kuhn's cut of a grid cell: one simplex for each order in which a path climbs from the lowest to the highest corner.
 template <int d>
 std::vector<std::array<int, d + 1>> kuhn_simplices() {
   std::array<int, d> order;
@@ -39,31 +39,31 @@ template <int d>
 Mesh<d> box(const std::array<int, d>& counts, const std::array<double, d>& lengths, Diagonal diagonal) {
   for (int a = 0; a < d; ++a) {
     const auto axis = static_cast<std::size_t>(a);
-    if (counts[axis] < 1) refuse("a box needs at least one brick along each axis");
+    if (counts[axis] < 1) refuse("a box needs at least one cell along each axis");
     if (!(lengths[axis] > 0)) refuse("a box needs positive lengths");
   }
   if (d == 3 && diagonal == Diagonal::crisscross) refuse("a criss-cross mesh exists for d = 2 only; use right or left");
   std::array<Index, d + 1> stride{1};
-  Eigen::Index bricks = 1;
+  Eigen::Index grid_cells = 1;
   for (std::size_t a = 0; a < d; ++a) {
     stride[a + 1] = stride[a] * (counts[a] + 1);
-    bricks *= counts[a];
+    grid_cells *= counts[a];
   }
   const bool centred = diagonal == Diagonal::crisscross;
   const bool mirrored = diagonal == Diagonal::left;
   const auto simplices = kuhn_simplices<d>();
-  const auto per_brick = centred ? 4 : static_cast<Eigen::Index>(simplices.size());
+  const auto per_grid_cell = centred ? 4 : static_cast<Eigen::Index>(simplices.size());
 
   Mesh<d> mesh;
-  mesh.nodes.resize(stride[d] + (centred ? bricks : 0), d);
+  mesh.nodes.resize(stride[d] + (centred ? grid_cells : 0), d);
   for (Index i = 0; i < stride[d]; ++i)
     for (std::size_t a = 0; a < d; ++a)
       mesh.nodes(i, static_cast<int>(a)) = lengths[a] * ((i / stride[a]) % (counts[a] + 1)) / counts[a];
 
-  mesh.cells.resize(bricks * per_brick, d + 1);
-  for (Eigen::Index brick = 0, cell = 0; brick < bricks; ++brick) {
+  mesh.cells.resize(grid_cells * per_grid_cell, d + 1);
+  for (Eigen::Index grid_cell = 0, cell = 0; grid_cell < grid_cells; ++grid_cell) {
     std::array<Index, d> at;
-    for (Eigen::Index a = 0, rest = brick; a < d; rest /= counts[static_cast<std::size_t>(a)], ++a)
+    for (Eigen::Index a = 0, rest = grid_cell; a < d; rest /= counts[static_cast<std::size_t>(a)], ++a)
       at[static_cast<std::size_t>(a)] = static_cast<Index>(rest % counts[static_cast<std::size_t>(a)]);
     const auto corner = [&](int bits) {
       Index node = 0;
@@ -74,7 +74,7 @@ Mesh<d> box(const std::array<int, d>& counts, const std::array<double, d>& lengt
       return node;
     };
     if (centred) {
-      const auto centre = static_cast<Index>(stride[d] + brick);
+      const auto centre = static_cast<Index>(stride[d] + grid_cell);
       for (int a = 0; a < d; ++a)
         mesh.nodes(centre, a) = lengths[static_cast<std::size_t>(a)] * (at[static_cast<std::size_t>(a)] + 0.5) /
                                 counts[static_cast<std::size_t>(a)];

@@ -23,8 +23,8 @@ double NormalCompliance::energy(double r) const {
   if (linear()) return 0.5 * stiffness * r * r;
   const double full =
       stiffness > 0 ? std::pow(pressure_limit / stiffness, 1 / exponent) : r;  // penetration of the largest pressure
-  const double bent = std::min(r, full);
-  return stiffness * std::pow(bent, exponent + 1) / (exponent + 1) + (r > full ? pressure_limit * (r - full) : 0);
+  const double rising = std::min(r, full);
+  return stiffness * std::pow(rising, exponent + 1) / (exponent + 1) + (r > full ? pressure_limit * (r - full) : 0);
 }
 
 FrictionBound Friction::bound(double pressure, double slip_speed) const {

@@ -47,11 +47,10 @@ class BalanceEvaluator {
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, contact_force_;         // B w, E lambda
-  VecHandle conducted_, exchanged_;             // D theta, J theta
-  VecHandle contact_heat_, contact_heat_size_;  // heat that leaves at the contact points, and its magnitudes
-  Eigen::SparseMatrix<double, Eigen::RowMajor>
-      shape_;  // hat functions at the contact points, found anew from positions
+  VecHandle viscous_w_, contact_force_;                 // B w, E lambda
+  VecHandle conducted_, exchanged_;                     // D theta, J theta
+  VecHandle contact_heat_, contact_heat_size_;          // heat that leaves at the contact points, and its magnitudes
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // hat functions at the contact points, found from positions
   struct RowSizes {
     double sum = 0, largest = 0;
   };

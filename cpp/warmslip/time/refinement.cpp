@@ -24,12 +24,12 @@ double Errors::largest() const {
   return worst;
 }
 
-// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `floor`.
+// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `least`.
 template <int d>
-void Stepper<d>::note(double& error, Extent& field, double change, double size, double floor) {
+void Stepper<d>::note(double& error, Extent& field, double change, double size, double least) {
   field.tried = change;
   field.size = std::max(field.size, size);
-  field.scale = std::max({field.scale, size, floor});
+  field.scale = std::max({field.scale, size, least});
   error = field.scale > 0 ? change / field.scale : 0;
 }
 

@@ -109,7 +109,7 @@ class Stepper {
   /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
   /// goes on passes the contact forces and statuses of its last step and the extents so far as well, and for a body
   /// without supports how its motion was parted: the next step is then the same to the last bit as that of a stepper
-  /// that was told to `clear_cache` there.
+  /// that called `clear_cache` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
   void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldExtents& extents);
   /// After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of
@@ -175,7 +175,7 @@ class Stepper {
   Balances refine(const StepLoads& loads, Balances balances, ContactSolution<d>& contact);
   bool correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool apply);
   void correct_heat(const StepInputs& inputs, const Balances& balances, bool apply);
-  static void note(double& error, Extent& field, double change, double size, double floor);
+  static void note(double& error, Extent& field, double change, double size, double least);
   bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
   Motion motion_of(const ContactSolution<d>& contact) const;
   void undo(const Motion& motion, ContactSolution<d>& contact);

@@ -59,7 +59,7 @@ def run(
         for sentence in result.summary["warnings"]:
             console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
     if not result.completed:
-        sys.exit(130 if result.outcome == "interrupted" else 1)  # it has said why
+        sys.exit(130 if result.outcome == "interrupted" else 1)  # it has given the reason
 
 
 def _refuse_dashless(petsc: str) -> None:
@@ -97,7 +97,7 @@ def export(
     fields: Annotated[str, typer.Option(help="names, comma between: displacement,pressure; default all")] = "",
     times: Annotated[str, typer.Option(help="times, comma between, of the nearest stored states; default all")] = "",
 ) -> None:
-    """Write a stored run as a series that ParaView opens, and its resultants and ledger as CSV."""
+    """Write a stored run as a series that ParaView opens, and its resultants and balances as CSV."""
     from warmslip.io import paraview
 
     names = [name.strip() for name in fields.split(",")] if fields else paraview.FIELDS

@@ -69,7 +69,7 @@ def export(
     body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
     contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
     `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
-    contact part, and the ledger of every step. The files of an earlier series in `out` are removed. `say` is called with a
+    contact part, and the balances of every step. The files of an earlier series in `out` are removed. `say` is called with a
     sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError for what
     is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be written.
     """

@@ -1,4 +1,4 @@
-"""A run read from disk: lazy states, contact points, step reports and the ledger of every step, from one HDF5 file."""
+"""A run read from disk: lazy states, contact points, step reports and the balances of every step, from one HDF5 file."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class Trajectory:
         return list(json.loads(self._read.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
-        """Every dataset of `steps`, `ledger` or `contact` as arrays."""
+        """Every dataset of `steps`, `balances` or `contact` as arrays."""
         fixed = () if group in ("steps", "balances") else ("positions", "normals", "weights", "part")
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()

@@ -1,4 +1,4 @@
-"""Writing a run to disk while it goes on: states, contact points, step reports and the ledger, in one HDF5 file."""
+"""Writing a run to disk while it goes on: states, contact points, step reports and the balances, in one HDF5 file."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ class TrajectoryWriter:
         self._file[name][:] = file[name][rows]
 
     def step(self, report: Any, taken: int) -> None:
-        """Appends the report, the ledger and the contact points of the step just taken, and its state when due (collective)."""
+        """Appends the report, the balances and the contact points of the step just taken, and its state when due (collective)."""
         stepper, scene = self._stepper, self._d.scene
         self._taken = taken
         gap = self._d.load_vectors.on_points("gap", stepper.time) if self._writing else None

@@ -77,8 +77,8 @@ class Law:
 class CheckedFunction:
     """A function of a law as the core calls it: what it gives is tried each time, and what cannot be becomes `nothing`.
 
-    A step whose answer lies there fails, on all ranks alike; an iterate that went too far is led back by the safeguards of the
-    contact solver. `violation` has the reason for the least place since `reset`.
+    A step whose answer lies there fails, on all ranks alike; an iterate that went too far is brought back by the
+    safeguards of the contact solver. `violation` has the reason for the least place since `reset`.
     """
 
     nothing: Triple = (math.nan, math.nan, math.nan)

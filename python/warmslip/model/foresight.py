@@ -18,7 +18,7 @@ TIMES = 16  # at which data that depend on time are looked at
 
 
 def before(d: Discretisation) -> list[str]:
-    """All that is to be said before the first step. Nothing of functions in Python, which are not asked without need."""
+    """All warnings before the first step. Nothing of functions in Python, which are not asked without need."""
     return [*([] if "loads" in d.own else plausible_data.of_scene(d.scene)), *_gaps(d), *_starts(d), *_coupling(d)]
 
 

@@ -138,7 +138,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
 
 
 def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) -> list[dict[str, Any]]:
-    """What is said of every scene of the library and what its run takes, in seconds: medians of `repeats` of both, in turns."""
+    """Predicted and measured seconds of every scene of the library: medians of `repeats` of both, in turns."""
     names, rows = library(), []
     for i, name in enumerate(names, start=1):
         scene = load(name)
@@ -154,7 +154,15 @@ def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) 
                 message.append(predicted)
                 took.append(found)
         middle, real = float(np.median(message)), float(np.median(took))
-        rows.append({"scene": name, "steps": scene.time.steps, "said": middle, "took": real, "ratio": middle / real})
+        rows.append(
+            {
+                "scene": name,
+                "steps": scene.time.steps,
+                "predicted_s": middle,
+                "measured_s": real,
+                "ratio": middle / real,
+            }
+        )
         if progress:
             progress(i, len(names))
     return rows

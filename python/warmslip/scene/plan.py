@@ -80,7 +80,7 @@ def _of_contact(contact: ContactTable) -> dict[str, str]:
     if friction is not None and friction.coefficient == 0 and friction.cohesion == 0:
         out["contact.friction"] = "the bound is 0"
     if exchange is not None and exchange.conductance == 0 and exchange.per_pressure == 0:
-        out["contact.heat_exchange"] = "no heat is led"
+        out["contact.heat_exchange"] = "no heat is conducted"
     if contact.friction_heating is not None and (contact.friction_heating.share == 0 or "contact.friction" in out):
         out["contact.friction_heating"] = "no heat is made"
     if contact.stiffness == 0 and (friction is None or friction.cohesion == 0) and exchange is None:
@@ -150,7 +150,7 @@ def plan(scene: Scene) -> Plan:
     if touching:
         kind = "semismooth Newton on the contact points"
         kept = d == 2 and all(_piecewise_linear(c) for c in touching)
-        steps.append(f"{kind}, its factor {'kept while statuses stay' if kept else 'made anew in every iteration'}")
+        steps.append(f"{kind}, its factor {'kept while statuses stay' if kept else 'computed in every iteration'}")
         steps += [
             f"regularised friction on '{c.part}': a point under half its bound creeps at {c.friction.creep(0.5):.3g}"
             for c in touching

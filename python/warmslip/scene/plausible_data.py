@@ -30,7 +30,7 @@ def of_scene(scene: Scene) -> list[str]:
 
 
 def defaults(scene: Scene) -> Iterator[str]:
-    """Density and capacity that are 1 because nothing is said of them."""
+    """Density and capacity that are 1 because the scene does not give them."""
     tables: list[tuple[str, Any, str]] = [("inertia", scene.inertia, "density"), ("heat", scene.heat, "capacity")]
     tables += [(f"regions.{name}.inertia", region.inertia, "density") for name, region in scene.regions.items()]
     for key, table, what in tables:

@@ -114,7 +114,7 @@ class Monitor:
         return [growth.log((now - last) ** 2) for now, last in zip(given, before, strict=True)]
 
     def fed(self) -> list[str]:
-        """What is to be said of a growth."""
+        """The warning about a growth."""
         scene = self._scene
         limits = [one.limit(scene.time.coupling) for one in self._coupled if one.cancels]
         itself = any(one.drives_itself(size(self._d)) for one in self._coupled if not one.cancels)
@@ -150,13 +150,13 @@ class Monitor:
             return -np.inf, np.inf
         loads, end, x = d.loads, scene.time.end, np.asarray(d.mesh.nodes)
         values = [evaluate(read(scene.initial.temperature), x, 0.0, 1)]
-        held = [(part, loads.temperature.get(part, 0.0)) for part in scene.supports.temperature]
-        led = [
+        prescribed = [(part, loads.temperature.get(part, 0.0)) for part in scene.supports.temperature]
+        conducting = [
             (contact.part, loads.on_contact("foundation_temperature", i))
             for i, contact in enumerate(scene.contacts)
             if contact.heat_exchange is not None
         ]
-        for part, value in held + led:
+        for part, value in prescribed + conducting:
             if callable(value) and not isinstance(value, Formula):
                 return -np.inf, np.inf
             places = x[np.unique(d.mesh.parts[part])]

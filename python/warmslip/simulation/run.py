@@ -133,7 +133,7 @@ def run(
 
 
 def _ended(simulation: Simulation, folder: Path) -> Result | None:
-    """The result in a folder where this very run has ended right before (collective). Functions in Python are not told apart."""
+    """The result in a folder where this very run was completed before (collective). Python functions are compared by name."""
     found: Result | None = None
     if (
         simulation.comm.rank == 0 and not simulation.discretisation.own and (folder / "final.vtu").exists()

@@ -76,7 +76,7 @@ class Simulation:
         return self._resumed + int(self.stepper.cost.steps)
 
     def steps(self) -> Iterator[tuple[State, Any]]:
-        """Advances to the end, yielding the state and the report of every step (`_core.StepReport`, with its `ledger`).
+        """Advances to the end, yielding the state and the report of every step (`_core.StepReport`, with its `balances`).
 
         Ends before a step that is not right, whose state is not kept: see `outcome` and `failure`. Collective.
         """

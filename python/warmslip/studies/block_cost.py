@@ -174,14 +174,14 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     """
     product = PETSc.Log.Event("MatMult")
     simulation, model = Simulation(scene(full, chosen)), Simulation(full)
-    one, whole_model, floor = Member(simulation), Member(model), MinimalStep(simulation)
+    one, whole_model, minimal = Member(simulation), Member(model), MinimalStep(simulation)
     times: dict[str, list[float]] = {"step": [], "least": [], "whole_model": []}
     products = 0
     for n in range(full.time.steps):
         before = product.getPerfInfo()["count"]
         times["step"].append(timed(one.step))
         products += product.getPerfInfo()["count"] - before
-        times["least"].append(timed(floor.step))
+        times["least"].append(timed(minimal.step))
         if n % TURN == TURN - 1:  # both see the same machine
             times["whole_model"] += [timed(whole_model.step) for _ in range(TURN)]
     times |= {"contact_solver": one.contact, "balances": one.balances}

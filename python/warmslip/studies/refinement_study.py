@@ -1,4 +1,4 @@
-"""The refinement study of a scene: every member of an h,k grid marches beside the reference and is measured as it goes.
+"""The refinement study of a scene: every member of an h,k grid advances beside the reference and is measured as it goes.
 
 All members share the clock of the reference, so nothing is stored: at each time that a member reaches, its distance to
 the reference is measured and its maximum kept. Members on one mesh share their operators; each step size has its factors.
@@ -125,9 +125,9 @@ def study(
     runs = [(simulation(n, m), Largest()) for n, m in members(levels, reference, grid)]
     compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
     steps = {id(run): run.steps() for run, _ in runs}
-    marching = finest.steps()
+    reference_steps = finest.steps()
     for n in range(1, steps_per_level * reference + 1):
-        _next(marching, finest)
+        _next(reference_steps, finest)
         for run, largest in runs:
             if n % (steps_per_level * reference // run.scene.time.steps) == 0:
                 _next(steps[id(run)], run)

@@ -253,7 +253,7 @@ def test_in_space_a_plane_problem_has_its_own_bound() -> None:
 def step_from(scene: Scene, starts: list[Array], force: Array | None, penetration: Array | None) -> list[Array]:
     """Contact forces (points, d) of one step of the core from other forces of the step before, (points, d).
 
-    The foundation is rigid: it stores no energy, and the books close from any forces.
+    The foundation is rigid: it stores no energy, and the balances close from any forces.
     """
     d = discretise(scene)
     out = []

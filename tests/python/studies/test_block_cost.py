@@ -1,4 +1,4 @@
-"""Every combination of blocks does the solves of the blocks it has and no others; its floor gives the same numbers."""
+"""Every combination of blocks does the solves of the blocks it has and no others; its minimal step gives the same numbers."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
     there = [name for name in OPERATORS if getattr(simulation.discretisation.operators, name) is not None]
     estimates = counted.stepper.cost.estimates * (("elasticity" in there) + ("heating" in there))
     assert products == 10 * len(there) + estimates and there == sorted(expected(chosen), key=OPERATORS.index)
-    floor = block_cost.MinimalStep(simulation)
+    minimal = block_cost.MinimalStep(simulation)
     for _ in simulation.steps():
-        floor.step()
+        minimal.step()
     assert simulation.outcome == "completed" and simulation.taken == 10
     cost, fields = simulation.stepper.cost, [chosen["motion"] != "none", chosen["heat"] != "none"]
     assert (cost.substitutions, cost.factorizations, cost.refinements) == (10 * sum(fields), sum(fields), 0)
@@ -64,7 +64,7 @@ def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
         assert cost.contact_seconds == 0 and len(simulation.discretisation.surface.weights) == 0
         k = FULL.step
         for name, factor in (("u", 1.0), ("w", k), ("theta", 1.0)):  # a velocity that dies out is the rounding of u / k
-            exact, found = getattr(simulation.stepper, name), getattr(floor, name)
+            exact, found = getattr(simulation.stepper, name), getattr(minimal, name)
             assert (exact is None) == (found is None)
             if exact is not None:
                 size = np.abs(exact.array if name == "theta" else simulation.stepper.u.array).max()
@@ -74,7 +74,7 @@ def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
 def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimate, "library", lambda: ["heat_slab"])
     (row,) = estimate.table(repeats=1)
-    assert row["scene"] == "heat_slab" and row["said"] > 0 and row["took"] > 0
+    assert row["scene"] == "heat_slab" and row["predicted_s"] > 0 and row["measured_s"] > 0
     monkeypatch.setattr(block_cost, "combinations", lambda: iter(ALL[-2:]))
     for row in block_cost.table(4, 20):
         assert (row["unknowns"], row["substitutions"], row["refinements"]) == (75, 2, 0)
@@ -88,7 +88,7 @@ def test_the_command_writes_both_tables(command: Command, tmp_path: Path, monkey
 
 
 def test_the_ratios_are_those_of_the_seconds_given() -> None:
-    """A step of 10 with 2 in contact and 3 in its books, least code of 4, a whole model of 20; one disturbed step in five."""
+    """A step of 10 with 2 in contact and 3 in its balances, least code of 4, a whole model of 20; one disturbed step in five."""
     calm = {"step": 10.0, "whole_model": 20.0, "contact_solver": 2.0, "balances": 3.0, "least": 4.0}
     seconds = {name: np.full(40, value) for name, value in calm.items()}
     seconds["step"][::5] = 1000

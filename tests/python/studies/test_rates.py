@@ -224,8 +224,8 @@ def test_verdict_of_a_study(tmp_path: Path) -> None:
 def test_a_verdict_needs_something_to_judge(tmp_path: Path) -> None:
     nothing = dict(studies=[], manufactured_table=None, readings=None, extremes=None, expected={})
     assert not acceptance.verdict(**nothing)["passed"]
-    books = dict.fromkeys(BALANCES, 1e-12)
-    cells = [{"ladder": "gap g", "value": 0.0, "verdict": v} | books for v in ("right", "WRONG")]
+    residuals = dict.fromkeys(BALANCES, 1e-12)
+    cells = [{"ladder": "gap g", "value": 0.0, "verdict": v} | residuals for v in ("right", "WRONG")]
     assert acceptance.closed(cells[0])
     for name, size in {"law": 2e-8, "heat": 1e-8, "energy": 1e-8, "force": math.nan}.items():
         assert not acceptance.closed(cells[0] | {name: size})

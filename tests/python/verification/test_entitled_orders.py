@@ -106,10 +106,10 @@ def test_time_blocks_fill_the_time() -> None:
 
 def test_uniform_blocks_are_the_plain_run() -> None:
     scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8} | HOT)
-    march = study.Member(scene, make_mesh(scene), grading.time_blocks(1.0, 8, 0))
-    for _ in march.advance():
+    advance = study.Member(scene, make_mesh(scene), grading.time_blocks(1.0, 8, 0))
+    for _ in advance.advance():
         pass
-    np.testing.assert_array_equal(march.discretisation.field(march.stepper.theta), warmslip.run(scene).theta)
+    np.testing.assert_array_equal(advance.discretisation.field(advance.stepper.theta), warmslip.run(scene).theta)
 
 
 @pytest.mark.slow

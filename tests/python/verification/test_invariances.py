@@ -54,10 +54,10 @@ def test_unchanged(name: str, check: Callable[[Scene], float]) -> None:
 
 def test_what_should_change_the_answer_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scaling that forgets the gap, and a restart that comes a step late, are seen."""
-    one, honest = scene(contact__gap=1e-3), invariances.in_units
-    monkeypatch.setattr(invariances, "in_units", lambda s, u: honest(s, u).override(**{"contact.gap": 1e-3}))
+    one, original = scene(contact__gap=1e-3), invariances.in_units
+    monkeypatch.setattr(invariances, "in_units", lambda s, u: original(s, u).override(**{"contact.gap": 1e-3}))
     assert invariances.units_apart(one, Units(length=4)) > 1e-6
-    monkeypatch.setattr(invariances, "in_units", lambda s, u: honest(s, replace(u, temperature=1.0)))
+    monkeypatch.setattr(invariances, "in_units", lambda s, u: original(s, replace(u, temperature=1.0)))
     assert invariances.units_apart(one, Units(temperature=4)) > 1e-3
     monkeypatch.undo()
     monkeypatch.setattr(invariances, "finish", lambda s, *a, **k: _one_step_less(s))

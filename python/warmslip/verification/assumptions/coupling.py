@@ -78,7 +78,7 @@ def coupling(d: Discretisation) -> Iterator[Finding]:
         verdict(power <= rate),
         "Without loads the energy cannot grow, whatever the sign of the coupling and of F - sym(M x R)."
         if power <= rate
-        else "Nothing proves that the energy stays bounded without loads; compare the ledger's expansion work and heating.",
+        else "Nothing proves that the energy stays bounded without loads; compare expansion work and heating in the balances.",
     )
     yield _step(d.full.time.coupling, a, f, m, r, rate, k)
 
@@ -148,5 +148,5 @@ def _step(scheme: str, a: Array, f: Array, m: Array, r: Array, rate: float, k: f
             "coupling = 'monolithic'."
         )
     else:
-        meaning = "No step is proved safe, because 'coupling, energy' is not; watch the ledger."
+        meaning = "No step is proved safe, because 'coupling, energy' is not; watch the energy balance."
     return Finding(topic, statement, (("k", k), ("largest k", limit)), verdict(k <= limit), meaning)

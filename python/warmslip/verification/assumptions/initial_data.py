@@ -72,7 +72,7 @@ def _displacement(miss: float) -> Finding:
         "yes" if miss <= FIT else "no",
         "u0 lies in V."
         if miss <= FIT
-        else "u0 is bent to zero within one layer of cells, whose strain grows like 1/sqrt(h): |u|_V does not converge.",
+        else "u0 is brought to zero within one layer of cells, whose strain grows like 1/sqrt(h): |u|_V does not converge.",
     )
 
 

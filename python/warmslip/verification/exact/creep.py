@@ -48,9 +48,9 @@ def euler(k: float, steps: int) -> Array:
 
 @dataclass(frozen=True)
 class Creep:
-    """One run, an entry a step: mean elongations, contact forces; `bent` is the largest departure of u from an affine one."""
+    """One run, an entry a step: mean elongations, contact forces; `departure` is the largest of u from an affine one."""
 
-    bent: float
+    departure: float
     elongation: Array
     force: Array
     theta: Array  # mean temperature
@@ -70,13 +70,13 @@ def _creep(steps: int, coupling: str = "staggered") -> Creep:
     loads = Loads(contact_traction=np.array([0.0, -TRACTION]), gap=GAP)
     simulation = fixtures.run(scene, loads, fixtures.distorted((3, 5), (1.0, H)))
     y, bottom = fixtures.nodes(simulation)[:, 1], fixtures.on(simulation, "bottom")
-    rows, bent = [], 0.0
+    rows, departure = [], 0.0
     for report in fixtures.steps(simulation):
         u, _, theta = fixtures.fields(simulation)
         a = -u[bottom, 1].mean() / H
-        bent = max(bent, fixtures.worst(u, np.stack([0 * y, a * (y - H)], axis=1)))
+        departure = max(departure, fixtures.worst(u, np.stack([0 * y, a * (y - H)], axis=1)))
         rows.append((a, report.normal_force, fixtures.mean(simulation, theta)))
-    return Creep(bent, *np.array(rows).T)
+    return Creep(departure, *np.array(rows).T)
 
 
 def _recursion() -> list[Check]:
@@ -87,7 +87,7 @@ def _recursion() -> list[Check]:
     pressure = STIFFNESS * np.maximum(exact * H - GAP, 0)
     late = np.append(0.0, exact[:-1])
     errors = {
-        "u is affine on a distorted mesh": staggered.bent,
+        "u is affine on a distorted mesh": staggered.departure,
         "every step is backward Euler's recursion": fixtures.worst(staggered.elongation, exact),
         "the contact force is c_nu (u_nu - g)": fixtures.worst(staggered.force, pressure),
         "staggered: it is heated by w_n": fixtures.worst(staggered.theta, HEATING * exact),

@@ -102,12 +102,12 @@ def study(
     compare = [Comparison(run.discretisation, finest.discretisation) for run in runs]
     chain = [Comparison(run.discretisation, other.discretisation) for run, other in zip(runs, finer, strict=True)]
     largest, gaps = ([Largest() for _ in runs] for _ in range(2))
-    marching = [run.advance() for run in runs]
+    advancing = [run.advance() for run in runs]
     total = sum(block.steps for block in finest.blocks)
     for step, _ in enumerate(finest.advance(), 1):
         for i in reversed(range(len(runs))):  # the finer ones first: each is compared with the next
             if step % (reference // sizes[i]) == 0:
-                next(marching[i])
+                next(advancing[i])
                 largest[i].add(compare[i].difference(runs[i].stepper, finest.stepper))
                 gaps[i].add(chain[i].difference(runs[i].stepper, finer[i].stepper))
         if progress:

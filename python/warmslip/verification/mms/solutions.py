@@ -76,14 +76,14 @@ def exactness(dim: int, coupling: str) -> Check:
 def sticking(dim: int, quadrature: str) -> Check:
     """The largest tangential velocity of a contact node at any step, over the largest velocity anywhere."""
     scene = setting(dim, {"mesh.n": 8 if dim == 2 else 4, "time.steps": 8, "contact.quadrature": quadrature})
-    worst, fastest = 0.0, 0.0
+    worst, max_speed = 0.0, 0.0
 
     def watch(simulation: Simulation) -> None:
-        nonlocal worst, fastest
+        nonlocal worst, max_speed
         w = simulation.discretisation.field(simulation.stepper.w)
         touching = np.unique(simulation.discretisation.mesh.parts[scene.contact.part])
         worst = max(worst, float(np.abs(w[touching, :-1]).max()))
-        fastest = max(fastest, float(np.abs(w).max()))
+        max_speed = max(max_speed, float(np.abs(w).max()))
         # with more points than nodes sticking points share a force as they please, some up to their bounds
         if quadrature == "nodal" and simulation.report.stick != len(simulation.discretisation.surface.weights):
             worst = np.inf
@@ -93,7 +93,7 @@ def sticking(dim: int, quadrature: str) -> Check:
         f"stick by the law alone, {dim}D, {quadrature}",
         "sticking points do not move, at any step",
         "manufactured",
-        worst / fastest,
+        worst / max_speed,
         STUCK,
     )
 
