@@ -44,7 +44,7 @@ extremes: setup  ## scenes all over the space of data, each judged in 80 digits 
 envelope: setup  ## how far each datum of five scenes can be moved (ARGS: --scenes, --axes, --jobs N)
 	@$(env) python tests/campaign/envelope.py $(ARGS)
 
-docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, essays that are run (ARGS go to sphinx-build)
+docs: setup  ## the site into build/docs: tutorial, how-to, reference, theory, examples that are run (ARGS go to sphinx-build)
 	@bash workflows/docs.sh $(ARGS)
 
 wheel:  ## the wheel built, installed into a fresh environment and used from an empty folder (five minutes of CPU)

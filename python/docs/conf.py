@@ -29,13 +29,13 @@ html_show_sourcelink = False
 
 myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
 myst_heading_anchors = 3
-nb_custom_formats = {".py": "generated.essay"}
+nb_custom_formats = {".py": "generated.example"}
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_timeout = 120
 nb_execution_raise_on_error = True
 nb_merge_streams = True
-# the kernels that run the essays are silent while all is well
+# the kernels that run the examples print errors only
 _settings = tempfile.TemporaryDirectory()
 os.environ["IPYTHONDIR"] = _settings.name
 _profile = Path(_settings.name) / "profile_default"

@@ -13,8 +13,8 @@ PACKAGE, HEADERS = ROOT / "python" / "warmslip", ROOT / "cpp" / "warmslip"
 MET = ("StepReport2", "Cost", "Stepper2", "Operators2", "Factor")  # objects of the core that a user meets
 
 
-def essay(text: str) -> Any:
-    """An essay in the percent format as a notebook."""
+def example(text: str) -> Any:
+    """An example in the percent format as a notebook."""
     import jupytext
 
     notebook = jupytext.reads(text, fmt="py:percent")
@@ -99,13 +99,13 @@ def scene() -> str:
     schema, places = _tables()
     out = ["## The file itself", *_rows(schema)]
     needed = ", ".join(f"`[{key}]`" for key in schema["required"])
-    out += ["", f"Tables {needed} are needed, every other one is a block of the problem that may be absent."]
+    out += ["", f"The tables {needed} are needed. Every other table is optional and adds one term of the model."]
     for name, where in places.items():
         table = schema["$defs"][name]
         short = [place for place in where if not place.startswith("regions.NAME.") or name.startswith("Region")]
         out += ["", f"## {', '.join(f'[{place}]' for place in short)}", "", _cell(table.get("description", ""))]
         if "contact" in where:
-            out += ["", "`[[contact]]` with one table a part when there are several."]
+            out += ["", "With several contact parts, write one table `[[contact]]` for each part."]
         if len(short) < len(where):
             out += ["", "Also " + ", ".join(f"`[{place}]`" for place in where if place not in short) + "."]
         out += _rows(table)

@@ -1,4 +1,4 @@
-"""The essays of the site run as scripts and what their prose says is asserted in them; every page is in a table of contents."""
+"""The examples of the site run as scripts, with assertions for what they state; every page is in a table of contents."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import pytest
 from support.folders import DOCS
 from support.processes import child_environment
 
-ESSAYS = sorted((DOCS / "essays").glob("*.py"))
+EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
 
 
-def test_there_are_essays() -> None:
-    names = {path.stem for path in ESSAYS}
+def test_there_are_examples() -> None:
+    names = {path.stem for path in EXAMPLES}
     assert {"the_papers_problem", "a_scene_of_your_own", "writing_a_contact_law", "comparing_readings"} <= names
 
 
-@pytest.mark.parametrize("essay", ESSAYS, ids=lambda path: path.stem)
-def test_an_essay_runs(essay: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, str(essay)],
+        [sys.executable, str(example)],
         cwd=tmp_path,
         env=child_environment() | {"MPLBACKEND": "Agg"},
         text=True,
@@ -34,9 +34,9 @@ def test_an_essay_runs(essay: Path, tmp_path: Path) -> None:
     assert done.stdout
 
 
-@pytest.mark.parametrize("essay", ESSAYS, ids=lambda path: path.stem)
-def test_an_essay_claims_what_it_checks(essay: Path) -> None:
-    text = essay.read_text()
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_claims_what_it_checks(example: Path) -> None:
+    text = example.read_text()
     assert text.startswith("# %% [markdown]\n# # ")
     assert len(re.findall(r"^ *assert ", text, re.MULTILINE)) >= 4
     assert 60 <= len(text.splitlines()) <= 130
@@ -49,5 +49,5 @@ def test_every_page_is_in_a_table_of_contents() -> None:
             for line in block.splitlines():
                 if line.strip() and not line.startswith(":"):
                     listed.add((page.parent / line.strip().removeprefix("/")).resolve())
-    there = {path.with_suffix("").resolve() for path in (*DOCS.rglob("*.md"), *ESSAYS)}
+    there = {path.with_suffix("").resolve() for path in (*DOCS.rglob("*.md"), *EXAMPLES)}
     assert there == {path.resolve() for path in listed}

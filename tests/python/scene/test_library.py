@@ -22,7 +22,7 @@ from warmslip.scene import plan
 from warmslip.scene.reader import library
 from warmslip.studies import refinement_study
 
-# one number of each, regression: norm of the last state, or what its essay promises
+# one number of each, regression: norm of the last state, or what its file states
 PINNED = {
     "heat_slab": ("theta_L2", 4.590521916),
     "quasistatic_punch": ("u_V", 0.0128852955),
@@ -220,12 +220,12 @@ def test_two_ranks_give_the_answer_of_one(command: Command, tmp_path: Path, name
 
 
 def test_the_column_creeps_as_its_two_exponentials_say() -> None:
-    """The contact force at the end is the essay's, and the touch is where Kelvin-Voigt's column reaches the gap."""
+    """The final contact force is that of its file; the touch is where the Kelvin-Voigt column reaches the gap."""
     simulation = warmslip.Simulation(warmslip.load("creep_column"))
     force = [report.normal_force for _, report in simulation.steps()]
     young, height, stiffness, gap, traction = 3.0, 2.0, 7.0, 0.3, 1.2
     final = stiffness * (height * (traction + stiffness * gap) / (young + stiffness * height) - gap)
-    assert final == pytest.approx(0.618, abs=5e-4)  # as its essay says
+    assert final == pytest.approx(0.618, abs=5e-4)  # as its file states
     assert force[-1] == pytest.approx(final, rel=1e-11)
     touch = -0.5 * np.log(1 - gap / height / (traction / young))
     assert simulation.scene.step * np.count_nonzero(np.array(force) == 0) == pytest.approx(touch, abs=0.05)

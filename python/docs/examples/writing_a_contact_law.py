@@ -1,13 +1,13 @@
 # %% [markdown]
 # # Writing a contact law
 #
-# The scene's own laws are a power of the penetration and Coulomb's cone with its relatives. Real surfaces have others. Two of
-# them are written here as Python functions: the exponential compliance of rough surfaces, and friction that grows with the
-# logarithm of the slip speed, as in rate-and-state laws.
+# The scene file has a power law of the penetration, Coulomb friction and some variants of it. Real surfaces follow other laws
+# too. This example writes two of them as Python functions: the exponential compliance of rough surfaces, and friction that
+# grows with the logarithm of the slip speed, as in rate-and-state laws.
 #
-# A law gives three numbers. A compliance `p(r)` gives the pressure, its derivative, and the energy per area, the integral of `p`
-# from 0 to `r`: the ledger needs it. A friction bound `s(p, v)` gives the bound and its derivatives by pressure and slip speed:
-# Newton needs them.
+# A law returns three numbers. A compliance `p(r)` returns the pressure, its derivative, and the energy per area, which is the
+# integral of `p` from 0 to `r`. The energy balance needs this integral. A friction bound `s(p, v)` returns the bound and its
+# derivatives with respect to pressure and slip speed. Newton's method needs these derivatives.
 
 # %%
 import math
@@ -32,11 +32,11 @@ def quickening(pressure, speed):
 
 
 # %% [markdown]
-# ## A law is tried before it is used
+# ## A law is tested before it is used
 #
-# Derivatives are where one errs. Before a run, each function is called on a ladder of penetrations, pressures and
-# speeds, and compared with difference quotients; the energy is compared with the rectangles under the pressure. Here is a
-# compliance whose energy lacks the factor one half.
+# Errors are most likely in the derivatives. Before a run, warmslip evaluates each function at a sequence of penetrations,
+# pressures and speeds. It compares the derivatives with difference quotients, and the energy with a sum of rectangles under
+# the pressure. In this example, the energy of the compliance lacks the factor one half:
 
 # %%
 scene = warmslip.load("quasistatic_punch")  # a body pressed down by its lid, then pulled sideways
@@ -48,32 +48,33 @@ print(message)
 assert "the third value is the integral of the first" in message
 
 # %% [markdown]
-# ## First the law that is already there
+# ## A law with a known answer
 #
-# The cheapest test of a way to write laws is a law with a known answer: the scene's own, in Python.
+# The simplest test of a user-defined law is a law with a known answer: the law of the scene file, written in Python.
 
 
 # %%
-def marched(**laws):
+def simulate(**laws):
     simulation = warmslip.Simulation(scene, laws={"bottom": Law(**laws)} if laws else None)
     rows = [(s.time, r.normal_force, -r.friction_traction[0], r.max_penetration, r.slip) for s, r in simulation.steps()]
     assert simulation.outcome == "completed"
     return simulation, np.array(rows).T
 
 
-ordinary, output = marched()
-again, same = marched(compliance=lambda r: (1e4 * r, 1e4, 5e3 * r**2), friction=lambda p, v: (0.3 * p, 0.3, 0.0))
+ordinary, output = simulate()
+again, same = simulate(compliance=lambda r: (1e4 * r, 1e4, 5e3 * r**2), friction=lambda p, v: (0.3 * p, 0.3, 0.0))
 print(f"largest difference of all forces: {np.abs(same - output).max():.0e}")
 assert np.abs(same - output).max() < 1e-12
 
 # %% [markdown]
 # ## Rough surfaces
 #
-# The exponential law stiffens as asperities are flattened. Same lid, nearly the same force, since the body is far softer than
-# either contact; but the deepest penetration is a quarter, and the books close with the energy we wrote.
+# The exponential law stiffens as the asperities are flattened. The lid is the same, and the normal force is nearly the same,
+# because the body is far softer than either contact. The largest penetration is only a quarter. The energy balance holds with
+# the energy of the law above.
 
 # %%
-simulation, stiffening = marched(compliance=rough)
+simulation, stiffening = simulate(compliance=rough)
 print(
     f"normal force {output[1, -1]:.3f} and {stiffening[1, -1]:.3f}, deepest {output[3, -1]:.2e} and {stiffening[3, -1]:.2e}"
 )
@@ -85,12 +86,12 @@ assert max(simulation.statistics.residuals.values()) < 1e-11
 # %% [markdown]
 # ## Friction that grows with speed
 #
-# The lid moves sideways at 0.02 from t = 0.3 on. With Coulomb's law all points that touch slip at the end. With the other one the
-# bound of a point rises as it slips: fewer points slip, slower than the lid moves, and the force lies above Coulomb's
-# but well below what the speed of the lid would allow.
+# From t = 0.3 on, the lid moves sideways with the speed 0.02. With Coulomb's law, all touching points slip at the end. With
+# the other law, the bound of a point rises as the point slips. Fewer points slip, and they slip more slowly than the lid
+# moves. The friction force lies above that of Coulomb's law, but well below the value for the speed of the lid.
 
 # %%
-simulation, slowed = marched(friction=quickening)
+simulation, slowed = simulate(friction=quickening)
 reached, allowed = (slowed[2] / slowed[1]).max(), 0.3 + 0.05 * math.log1p(0.02 / 1e-3)
 print(f"Coulomb reaches {(output[2] / output[1]).max():.3f}; the new law {reached:.3f} of at most {allowed:.3f}")
 assert np.isclose((output[2] / output[1]).max(), 0.3) and 0.31 < reached < 0.8 * allowed
@@ -102,8 +103,8 @@ ax.set(xlabel="t", ylabel="friction over normal force")
 ax.legend()
 
 # %% [markdown]
-# What it costs: a law that is not piecewise linear has its Newton factor made in every iteration, and Python is called at every
-# point. Newton's method still needs few iterations, which the summary counts.
+# The cost: for a law that is not piecewise linear, the Newton factor is recomputed in every iteration, and Python is called at
+# every contact point. Newton's method still needs few iterations. The summary counts them.
 
 # %%
 iterations = {

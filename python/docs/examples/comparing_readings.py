@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Comparing readings
 #
-# The paper gives its material data in one line: "M = R = K = 1 for all entries". Taken by the letter the conductivity
-# K is a matrix of ones, whose inverse does not exist: heat flows along the diagonal alone. So the library holds four
-# readings. They differ in K (ones or identity), in the expansion M and in the heating R.
+# The paper gives its material data in one line: "M = R = K = 1 for all entries". Taken literally, the conductivity K is a
+# matrix of ones. This matrix has no inverse: heat flows along the diagonal only. The library therefore has four readings of
+# this line. They differ in K (ones or identity matrix), in the expansion tensor M and in the heating tensor R.
 
 # %%
 import matplotlib.pyplot as plt
@@ -20,9 +20,10 @@ for name, scene in scenes.items():
     print(f"{name:10s}  K {heat.conductivity}  M {heat.expansion.tensor}  R {heat.heating.tensor}")
 
 # %% [markdown]
-# ## A claim that tells them apart
+# ## A claim that distinguishes them
 #
-# The paper says that on a hotter foundation deformation, stress and temperature are larger. Two runs for each reading:
+# The paper states that deformation, stress and temperature are larger on a hotter foundation. Two runs for each reading test
+# this:
 
 # %%
 FOUNDATION = "contact.heat_exchange.foundation_temperature"
@@ -35,15 +36,15 @@ assert all(found["theta_L2"] > 10 for found in ratio.values())
 assert [name for name in READINGS if ratio[name]["u_V"] < 1] == ["isotropic"]
 
 # %% [markdown]
-# With K = M = R = I the swelling works against the weight, and the deformation gets smaller. So `isotropic` is not what the
-# paper computed. The other three pass.
+# With K = M = R = I, thermal expansion acts against the weight, and the deformation becomes smaller. The paper therefore did
+# not compute `isotropic`. The other three readings agree with the statement.
 #
 # ## The sign of R
 #
-# Expansion turns heat into work, heating turns work into heat. In the sum of the balances of motion and heat they cancel if
-# R = -M, the sign that thermodynamics asks for and the reading `consistent` has; where heat is not divided by the absolute
-# temperature T0, R is -T0 M. With R = M they add up. The ledger holds both terms of every step; in the monolithic coupling
-# both are taken at the new time and the statement is exact.
+# Expansion turns heat into work, and heating turns work into heat. In the sum of the balances of motion and heat, the two
+# terms cancel if R = -M. Thermodynamics requires this sign, and the reading `consistent` has it. If the heat equation is not
+# divided by the absolute temperature T0, the relation is R = -T0 M. With R = M, the two terms add up. The balances of every
+# step contain both terms. In the monolithic coupling, both are taken at the new time, and the cancellation is exact.
 
 # %%
 for name in ("mixed", "consistent"):
@@ -56,9 +57,9 @@ for name in ("mixed", "consistent"):
 # %% [markdown]
 # ## The orders
 #
-# In a refinement study every coarse run marches beside a fine one and is measured against it. Here h = k = 1/8, 1/16, 1/32
-# against 1/64, in the sum of |u|_V and |theta|_L2 that the paper's figure 5 shows; the committed
-# tables in `results/paper` go to 1/256.
+# In a refinement study, every coarse run advances together with a fine reference run and is compared with it. Here h = k =
+# 1/8, 1/16, 1/32, and the reference has 1/64. The error is the sum of |u|_V and |theta|_L2, as in figure 5 of the paper. The
+# committed tables in `results/paper` go to 1/256.
 
 # %%
 figure, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -75,10 +76,10 @@ assert min(errors["printed"]) > max(min(errors[name]) for name in READINGS[1:]) 
 assert orders["printed"] < 0.95 < min(orders[name] for name in READINGS[1:])
 
 # %% [markdown]
-# The reading as printed has by far the largest error and the lowest order: a singular K lets the temperature jump across the
-# diagonal. The orders of the others look better than they are, as the reference has an error of its own. A true first
-# order, measured against a solution only twice as fine as the finest run, would show log2(3) = 1.58 at the last halving;
-# `warmslip rates` takes that off.
+# The reading as printed has by far the largest error and the lowest order: its singular K lets the temperature jump across the
+# diagonal. The orders of the other readings look better than they are, because the reference has an error of its own. With a
+# reference only twice as fine as the finest run, a true first order appears as log2(3) = 1.58 at the last halving.
+# `warmslip rates` corrects for this effect.
 
 # %%
 true = [size - 1 / 64 for size in (1 / 16, 1 / 32)]

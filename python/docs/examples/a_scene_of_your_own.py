@@ -1,9 +1,10 @@
 # %% [markdown]
 # # A scene of your own
 #
-# A rubber foot stands on a rough floor. Its upper side is glued to a lid that goes down, and then to and fro. While it sticks it
-# is a spring; once it slides it takes energy out of the drive. The plot of force over displacement is a loop, its area is what a
-# cycle costs. We write the scene, ask what it will do, run it, and find that area in the ledger.
+# A rubber foot stands on a rough foundation. A lid is glued to its upper side. The lid moves down and then sideways, to and
+# fro. While the foot sticks, it acts as a spring. When it slides, it dissipates energy of the drive. The plot of force against
+# displacement is a loop, and the area of the loop is the energy lost in a cycle. This example writes the scene, prints what it
+# will do, runs it, and finds that area in the terms of the energy balance.
 
 # %%
 from pathlib import Path
@@ -45,9 +46,9 @@ scene = warmslip.load("foot.toml")
 print(plan.text(plan.plan(scene)))
 
 # %% [markdown]
-# Every table is a block of the problem. There is no `[inertia]`, so every step is in equilibrium; no `[heat]`, so there is no
-# temperature, no matrix for it and no solve. `warmslip explain foot.toml` says the same in a terminal, with the cost on this
-# machine. A key that is misspelt is refused before anything is computed:
+# Each table of the scene file adds one term of the model. This scene has no `[inertia]`, so every step is in equilibrium. It
+# has no `[heat]`, so it has no temperature, no matrix for it and no linear solve. `warmslip explain foot.toml` prints the same
+# text in a terminal, together with the cost on this machine. A misspelt key is rejected before anything is computed:
 
 # %%
 try:
@@ -66,7 +67,7 @@ steps = [
     (state.time, report.normal_force, report.friction_traction[0], report.balances)
     for state, report in simulation.steps()
 ]
-time, normal, friction, ledgers = (np.array(column, dtype=object) for column in zip(*steps, strict=True))
+time, normal, friction, balances = (np.array(column, dtype=object) for column in zip(*steps, strict=True))
 time, normal, friction = (column.astype(float) for column in (time, normal, friction))
 lid = 0.03 * np.sin(2 * np.pi * np.maximum(0, time - 0.5))
 assert simulation.outcome == "completed"
@@ -75,8 +76,9 @@ ax.plot(lid, -friction)
 ax.set(xlabel="displacement of the lid", ylabel="force of the drive")
 
 # %% [markdown]
-# The flat parts are Coulomb's: there the whole foot slides and friction is 0.3 times the normal force. The
-# slanted ones are the elastic foot while it sticks; it lets go point by point, so the corners are round.
+# On the flat parts, the whole foot slides, and by Coulomb's law the friction force is 0.3 times the normal force. On the
+# slanted parts, the foot sticks and deforms elastically. It starts to slide point by point, so the corners of the loop are
+# round.
 
 # %%
 ratio = np.abs(friction) / normal
@@ -84,17 +86,19 @@ print(f"largest friction over normal force: {ratio.max():.6f}")
 assert np.isclose(ratio.max(), 0.3, rtol=1e-9)
 
 # %% [markdown]
-# ## What a cycle costs
+# ## The energy of a cycle
 #
-# The ledger of every step holds the work of the supports, what the body and the foundation have stored, what friction took, and
-# what backward Euler itself damps. Over the second cycle, from t = 1.5 to 2.5, what is stored comes back, so the work of
-# the lid is friction and damping. The area of the loop, by the trapezoidal rule, is what friction took: backward Euler
-# multiplies a step of the lid with the force at its end, and the difference between the two rules is its damping.
+# The balances of every step contain the work of the supports, the energy stored in the body and in the foundation, the energy
+# lost to friction, and the numerical dissipation of backward Euler. After the second cycle, from t = 1.5 to 2.5, the stored
+# energy is the same as before it. The work of the lid is therefore friction plus numerical dissipation.
+#
+# The area of the loop by the trapezoidal rule is the energy lost to friction. Backward Euler multiplies each step of the lid
+# by the force at the end of the step. The difference between these two rules is the numerical dissipation.
 
 # %%
 cycle = time > 1.5 + 1e-9
 work, taken, damped = (
-    sum(sum(getattr(ledger, name) for name in names) for ledger in ledgers[cycle])
+    sum(sum(getattr(terms, name) for name in names) for terms in balances[cycle])
     for names in (["support_work"], ["friction"], ["elastic_damping", "contact_damping"])
 )
 force, moved = -friction[time > 1.5 - 1e-9], lid[time > 1.5 - 1e-9]
@@ -105,9 +109,9 @@ assert abs(area - taken) < 5e-3 * taken
 assert damped < 0.05 * taken
 
 # %% [markdown]
-# The damping is of the order of the step: halve the step, and it halves. A body with a `[viscosity]` would have a loss of its own
-# beside it, in the ledger's line `viscous`; with `[contact.friction_heating]` and `[heat]`, what friction takes
-# would warm the foot.
+# The numerical dissipation is proportional to the step size: half the step gives half the dissipation. A body with a table
+# `[viscosity]` would also have a physical loss, the term `viscous`. With `[contact.friction_heating]` and `[heat]`, the energy
+# lost to friction would warm the foot.
 
 # %%
 finer = warmslip.Simulation(scene.override(**{"time.steps": 400}))

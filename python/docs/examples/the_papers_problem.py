@@ -1,11 +1,11 @@
 # %% [markdown]
 # # The paper's problem
 #
-# A unit square hangs clamped from its top side. It is viscoelastic, it conducts heat, its own weight pulls it down, tractions
-# push it to the right, and its bottom side touches a foundation: the more it penetrates the harder the foundation presses back
-# (normal compliance), friction is Coulomb's, and heat flows between the two. That is the test problem of Bouallala, Essoufi,
-# Ouaanabi and Ouafik (2026), and the library holds it in four readings. Here is `paper_mixed` on a foundation as cold as the
-# body, and on a hot one.
+# A unit square is clamped at its top side. It is viscoelastic and conducts heat. Its weight pulls it down, and tractions push
+# it to the right. Its bottom side touches a foundation, whose pressure grows with the penetration (normal compliance).
+# Friction follows Coulomb's law, and heat flows between body and foundation. This is the test problem of Bouallala, Essoufi,
+# Ouaanabi and Ouafik (2026). The library contains it in four readings. This example runs `paper_mixed` on a foundation as cold
+# as the body, and on a hot one.
 
 # %%
 import matplotlib.pyplot as plt
@@ -27,8 +27,9 @@ for name, simulation in (("cold", cold), ("hot", hot)):
     )
 
 # %% [markdown]
-# `Simulation.steps` yields after every step a state, whose arrays are read while it lasts, and a report. Both runs end
-# `completed`: energy, heat, forces and the contact law closed in every step, to round-off.
+# `Simulation.steps` yields a state and a report after every step. The arrays of the state must be read before the next step.
+# Both runs end with the outcome `completed`: the balances of energy, heat and force and the contact law hold to round-off in
+# every step.
 
 # %%
 assert cold.outcome == hot.outcome == "completed"
@@ -43,12 +44,14 @@ for ax, (name, found) in zip(axes, last.items(), strict=True):
     figure.colorbar(drawn)
 
 # %% [markdown]
-# ## What the foot does
+# ## What happens at the contact
 #
-# The contact points are the nodes of the bottom side. Over the cold foundation every point that touches slips, and all of them
-# to the same side: the resultant of friction is the coefficient 0.2 times the normal force, no less. The hot foundation makes
-# the foot swell. It presses harder, parts of it are pushed to either side, and two points between stick; so
-# the resultant is well inside the cone, and it even points the other way.
+# The contact points are the nodes of the bottom side. On the cold foundation, every touching point slips, and all of them slip
+# to the same side. The resultant of friction is therefore the full coefficient 0.2 times the normal force.
+#
+# On the hot foundation, the body expands and presses harder. Some of its points are pushed to the left and others to the
+# right, and two points between them stick. The resultant is therefore well inside the friction cone, and it even points in the
+# opposite direction.
 
 # %%
 for name, found in last.items():
@@ -76,11 +79,11 @@ for ax, (name, found) in zip(axes, last.items(), strict=True):
 axes[0].legend()
 
 # %% [markdown]
-# ## How much of this is the mesh?
+# ## How large is the error of the mesh?
 #
-# A picture says nothing of its error. Halving h and k together and comparing the end does, roughly: where the method is of first
-# order, the difference to the next finer run is about the error of the finer one. `warmslip study` does it properly, against one
-# fine reference and over all times; see *Comparing readings*.
+# A picture does not show its error. A rough estimate is to halve h and k together and to compare the final values. For a
+# method of first order, the difference between a run and the next finer one is about the error of the finer one.
+# `warmslip study` measures the error properly, against one fine reference and over all times; see *Comparing readings*.
 
 # %%
 ends = []
@@ -92,4 +95,5 @@ assert abs(ends[2] - ends[1]) < 0.005 * ends[2]
 assert 0.35 < (ends[2] - ends[1]) / (ends[1] - ends[0]) < 0.65
 
 # %% [markdown]
-# The differences fall by about half, and the last one is below half a percent: the force at n = 32 is known to about that.
+# Each difference is about half of the previous one, and the last is below half a percent. The force at n = 32 is known to
+# about that accuracy.
