@@ -11,7 +11,7 @@ namespace warmslip {
 /// law; on a rigid foundation, which gives no pressure by its penetration, the pressure as well, also that of points
 /// which slip with a friction that does not follow it. They are unique, whereas Newton's depend on its path. Rest is
 /// called stick. `shape` (points, nodes) has those nodes' shape functions at the points. Velocities stay. Returns
-/// whether least forces were found; the ones that were there, which apply_regularised_law the law as well, stay
+/// whether least forces were found; the ones that were there, which obey the law as well, stay
 /// otherwise.
 template <int d>
 bool minimal_forces(const ContactProblem<d>& problem, const Eigen::SparseMatrix<double, Eigen::RowMajor>& shape,

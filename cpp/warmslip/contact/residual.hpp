@@ -1,4 +1,4 @@
-// How well forces and velocities apply_regularised_law the contact law.
+// How well forces and velocities obey the contact law.
 #pragma once
 #include "warmslip/contact/problem.hpp"
 

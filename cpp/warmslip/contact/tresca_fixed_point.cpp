@@ -80,7 +80,7 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
   return true;
 }
 
-// Friction bounds frozen, the step is convex: newton_with_lent_mass near its solution, move the bounds half way,
+// Friction bounds frozen, the step is convex: draw near its solution, move the bounds half way,
 // repeat; Newton finishes from there. An augmented Lagrangian for the forces and a fixed point for the bounds at once,
 // indifferent to stiffness.
 template <int d>
@@ -112,8 +112,7 @@ bool ContactSolver<d>::tresca_fixed_point(const ContactProblem<d>& problem, Cont
     finished.force = force;
     finished.velocity = velocity;
     if (!accept(problem, finished) && step % 10 != 9 && (step & (step + 1)) != 0) continue;
-    for (const double part :
-         {1.0, 1e-3}) {  // near the solution less has to newton_with_lent_mass points to the share they had
+    for (const double part : {1.0, 1e-3}) {  // near the solution less has to draw points to the share they had
       clear_cache();
       finished = solution;
       options_.proximal = part * proximal;

@@ -66,7 +66,7 @@ void BalanceEvaluator<d>::place(const std::vector<PetscInt>& at, const Eigen::Ve
 }
 
 // The contact terms: stored energy and friction from the forces, as a stiff law leaves no digits to its penetrations;
-// that forces and penetrations apply_regularised_law the law is a balance of its own.
+// that forces and penetrations obey the law is a balance of its own.
 template <int d>
 void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
