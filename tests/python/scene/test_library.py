@@ -140,8 +140,8 @@ def test_heat_is_left_out_of_several_contact_parts() -> None:
     ("scene", "words"),
     [
         ("quasistatic_punch", "kept while statuses stay"),
-        ("brake_pad", "made anew in every iteration"),
-        ("block_3d", "made anew in every iteration"),
+        ("brake_pad", "computed in every iteration"),
+        ("block_3d", "computed in every iteration"),
     ],
 )
 def test_a_plan_says_what_newton_keeps(scene: str, words: str) -> None:
