@@ -111,7 +111,7 @@ def test_a_page_is_true(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
             check(block, tmp_path)
 
 
-def test_every_term_of_the_ledger_is_explained() -> None:
+def test_every_term_of_the_balances_is_explained() -> None:
     text = (DOCS / "reference" / "core.md").read_text()
     assert [term for term in _core.Balances.terms if f"`{term}`" not in text] == []
 

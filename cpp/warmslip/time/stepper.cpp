@@ -165,8 +165,8 @@ std::string Stepper<d>::why(Outcome outcome, const Balances& l) const {
                                            std::pair{"force", l.force_residual}, std::pair{"law", l.law_residual}})
         if (!(residual <= bound)) list(name);
       return names + (iterative()
-                          ? " stays open: the linear solver is loose, and refinement does not mend it"
-                          : " stays open, and refinement does not mend it: terms of the step cancel beyond double "
+                          ? " residual above 1e-10 after iterative refinement: the linear solver tolerance is too loose"
+                          : " residual above 1e-10 after iterative refinement: terms of the step cancel beyond double "
                             "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other");
     }
     default:

@@ -29,7 +29,7 @@ def run(
         str, typer.Option(help='PETSc options, such as "-log_view -momentum_ksp_type cg"; see also PETSC_OPTIONS')
     ] = "",
 ) -> None:
-    """Run a scene. Exit code 0: right; 1: stopped, see the outcome; 2: cannot be run; 130: interrupted, --resume goes on."""
+    """Run a scene. Exit code 0: completed; 1: stopped early, see the outcome; 2: invalid input; 130: interrupted, see --resume."""
     if backend not in ("automatic", "cholmod", "petsc"):
         raise SceneError(f"--backend '{backend}' is unknown; use automatic, cholmod or petsc")
     if dry_run:
@@ -55,7 +55,7 @@ def run(
 
         result = run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if rank == 0:
-        typer.echo(f"{result.outcome}: {_told(result.summary)}, see {out}/summary.json")
+        typer.echo(f"{result.outcome}: {_ending(result.summary)}, see {out}/summary.json")
         for sentence in result.summary["warnings"]:
             console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
     if not result.completed:
@@ -76,19 +76,19 @@ def _digits(found: dict[str, float]) -> str:
     return "digits: " + ", ".join(f"{name.replace('_', ' ')} {int(value)}" for name, value in found.items())
 
 
-def _told(summary: dict[str, Any]) -> str:
-    """The end of a run in a few words; of one that stopped, the residuals of the step that was not taken."""
+def _ending(summary: dict[str, Any]) -> str:
+    """The end of a run in a few words; of one that stopped, the residuals of the step that was rejected."""
     failure = summary["failure"]
     if summary["outcome"] == "interrupted":
         return f"after {summary['steps']} of {summary['stamp']['scene']['time']['steps']} steps, --resume goes on"
     if failure is None:
         worst = max(summary["balances"][i] for i in ("energy", "heat", "force", "law"))
         return f"{summary['steps']} steps, largest balance residual {worst:.1e}, {_digits(summary['digits'])}"
-    words = [failure["reason"]] if failure["reason"] else []
-    words += [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason", "digits")]
-    if "digits" in failure:
-        words.append(_digits(failure["digits"]))
-    return f"step {failure['step']} was not taken ({', '.join(words)})"
+    numbers = [f"{k.replace('_', ' ')} {v:.1e}" for k, v in failure.items() if k not in ("step", "reason", "digits")]
+    parts = [failure["reason"]] if failure["reason"] else []
+    parts += [f"residuals: {', '.join(numbers)}"] if numbers else []
+    parts += [_digits(failure["digits"])] if "digits" in failure else []
+    return f"step {failure['step']} rejected: {'; '.join(parts)}"
 
 
 def export(

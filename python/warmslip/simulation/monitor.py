@@ -122,7 +122,7 @@ class Monitor:
         return plausibility.grown(self.seen["growth"], cancels=cancels, itself=itself, limit=min(limits, default=0.0))
 
     def reason(self, given: str) -> str:
-        """Why a step was not taken, where it is a growth that lasted until then: not what its numbers made of the step."""
+        """Why a step was rejected, where it is a growth that lasted until then: not what its numbers made of the step."""
         found = self.seen["growth"]
         lasted = bool(found) and found["end"] >= 0.8 * self._stepper.time
         return f"{self.fed()[0]}; in the end {re.split('[:;]', given)[0]}" if lasted else given

@@ -76,7 +76,7 @@ def run(
     rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
     completed, contact_not_converged, not_finite, data_not_finite (a load, a gap), support_inside_foundation,
     law_failed (a law of one's own), balance_violated, precision_lost, unsupported, solver_failed (`failure` in the summary
-    has the step that was not taken), and interrupted after
+    has the step that was rejected), and interrupted after
     Ctrl-C or SIGTERM, which leave a checkpoint.
     Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
     cannot be written.

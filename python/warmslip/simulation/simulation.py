@@ -78,7 +78,7 @@ class Simulation:
     def steps(self) -> Iterator[tuple[State, Any]]:
         """Advances to the end, yielding the state and the report of every step (`_core.StepReport`, with its `balances`).
 
-        Ends before a step that is not right, whose state is not kept: see `outcome` and `failure`. Collective.
+        Ends before a step that is rejected, whose state is not kept: see `outcome` and `failure`. Collective.
         """
         moving = self.discretisation.prescribed.of_time
         for n in range(self.taken + 1, self.scene.time.steps + 1):
@@ -113,7 +113,7 @@ class Simulation:
 
     def _stop(self, outcome: str, step: int, reason: str, **numbers: Any) -> None:
         self.outcome, self.failure = outcome, {"step": step, "reason": reason} | numbers
-        log.info("step %d was not taken: %s", step, outcome)
+        log.info("step %d rejected: %s", step, outcome)
 
     def _law_violation(self) -> str | None:
         """What a law of the user's did in the step, on the first rank that says so (collective)."""

@@ -119,7 +119,7 @@ class MinimalStep:
 
 
 class Member:
-    """A run step by step, with the seconds of its contact solver and its balances. RuntimeError when a step is not right."""
+    """A run step by step, with the seconds of its contact solver and its balances. RuntimeError when a step is rejected."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._job, self._steps = simulation, simulation.steps()

@@ -86,7 +86,7 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     difference = disagreement(simulation, other)
     reached = (
         simulation.failure or simulation.statistics.residuals
-    )  # of the step that was not taken, where there is one
+    )  # of the step that was rejected, where there is one
     line |= {"outcome": simulation.outcome, "disagreement": difference} | {
         key: reached.get(key, float("nan")) for key in BALANCES
     }

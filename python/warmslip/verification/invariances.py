@@ -45,7 +45,7 @@ UNITS = {
 
 
 def finish(scene: FullScene, mesh: Any = None, discretisation: Discretisation | None = None) -> dict[str, Array]:
-    """The final u (nodes, d), w (nodes, d), theta (nodes,). Raises RuntimeError when the run does not end right."""
+    """The final u (nodes, d), w (nodes, d), theta (nodes,). Raises RuntimeError when the run is not completed."""
     simulation = Simulation(scene, discretisation=discretisation or discretise(scene, mesh=mesh))
     for _ in simulation.steps():
         pass

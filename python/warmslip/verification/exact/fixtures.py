@@ -78,7 +78,7 @@ def run(scene: FullScene, loads: Loads | None = None, mesh: Triangulation | None
 
 
 def steps(simulation: Simulation) -> Iterator[Any]:
-    """A report a step. Raises RuntimeError when a step is not right: a closed form has nothing to say about it."""
+    """A report a step. Raises RuntimeError when a step is rejected: a closed form has nothing to say about it."""
     yield from (report for _, report in simulation.steps())
     if simulation.outcome != "completed":
         raise RuntimeError(f"the run ended: {simulation.outcome}, {simulation.failure}")

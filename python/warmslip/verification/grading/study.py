@@ -49,7 +49,7 @@ class Member:
         self.worst = dict.fromkeys(BALANCES, 0.0)
 
     def advance(self) -> Iterator[Any]:
-        """A report a step. Raises RuntimeError, with the outcome, when a step is not right."""
+        """A report a step. Raises RuntimeError, with the outcome, when a step is rejected."""
         d, loads = self.discretisation, self.discretisation.load_vectors
         for block in self.blocks:
             one = d.full.override(**{"time.end": block.k, "time.steps": 1})
@@ -81,7 +81,7 @@ def study(
 
     `e_TERM` is the distance to the reference, `gap_TERM` that to the next finer member, which has no bias: C h^p (1 - 2^-p).
     Raises ValueError for fewer than three levels, a reference that is not finer than all of them, or a size that is not
-    COARSEST times a power of two; RuntimeError when a run does not end right.
+    COARSEST times a power of two; RuntimeError when a run is not completed.
     """
     sizes = [*sorted(levels), reference]
     if len(levels) < 3:

@@ -38,7 +38,7 @@ def _right(outcome: str, scene: FullScene) -> None:
 
 
 def solution(scene: FullScene) -> Fields:
-    """The scene's run with its own coupling. Raises RuntimeError when it does not end right."""
+    """The scene's run with its own coupling. Raises RuntimeError when it is not completed."""
     simulation = Simulation(scene)
     d = simulation.discretisation
     found = [(d.field(simulation.stepper.w), d.field(simulation.stepper.theta)) for _ in simulation.steps()]
@@ -67,7 +67,7 @@ class Lambda:
         return Fields(np.zeros((steps, *w.shape)), np.zeros((steps, *theta.shape)))
 
     def __call__(self, frozen: Fields) -> Fields:
-        """Raises RuntimeError when a step of the decoupled problems does not end right."""
+        """Raises RuntimeError when a step of the decoupled problems is rejected."""
         d, coupling = self._apart, self.scene.time.coupling
         theta = frozen.theta if coupling == "monolithic" else _delayed(frozen.theta, self._initial[1])
         w = _delayed(frozen.w, self._initial[0]) if coupling == "lagged" else frozen.w
