@@ -86,7 +86,7 @@ void Stepper<d>::take_factors() {
   const bool moves = problem_.moves(), conducts = problem_.conducts();
   if (options_.coupling == Coupling::monolithic && moves && conducts) {
     if (problem_.contact_heats())
-      throw std::invalid_argument("heat that the contact makes or leads needs the staggered or the lagged coupling");
+      throw std::invalid_argument("heat that the contact makes or conducts needs the staggered or the lagged coupling");
     auto [scale, symmetry] = coupled_symmetry(problem_);
     coupled_scale_ = scale;
     const MatHandle a = coupled_matrix(layout_, problem_, operators_, k, scale);

@@ -201,9 +201,9 @@ bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& fro
   return solve_contact(contact_force_, contact);
 }
 
-// Heat that the contact leads or makes is known at the contact points alone: as power that a node loses by what it is
-// warmer than the foundation beside it, less what it receives at that temperature, from friction say. Counted from zero
-// the two would cancel where the contact leads heat well.
+// Heat that the contact conducts or makes is known at the contact points alone: as power that a node loses by what it
+// is warmer than the foundation beside it, less what it receives at that temperature, from friction say. Counted from
+// zero the two would cancel where the contact conducts heat well.
 template <int d>
 typename Stepper<d>::NodalFlow Stepper<d>::flow(const StepLoads& loads, const Eigen::VectorXd& force,
                                                 const Eigen::VectorXd& velocity) const {

@@ -1,4 +1,4 @@
-"""The coupling's tensors and what they say of growth; the equations (1) to (4) stand in `verify.audit_coupling`."""
+"""The coupling's tensors and what they say of growth; the equations (1) to (4) stand in `verification.assumptions.coupling`."""
 
 from __future__ import annotations
 

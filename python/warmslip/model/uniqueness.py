@@ -1,4 +1,4 @@
-"""How much friction a step bears before it may have several solutions. `pieces` has the exact value in the plane.
+"""How much friction a step bears before it may have several solutions. `linear_pieces` has the exact value in the plane.
 
 A contact force lambda leaves the points the velocity w = free - C lambda. Let A be C with 1/(weight c k) added to its normal
 entries, c the stiffness and k the step. Of two solutions of one step, delta being the difference of their forces, every point has

@@ -84,9 +84,7 @@ def cell(scene: FullScene, ladder: str, value: Any) -> dict[str, Any]:
     except (RuntimeError, MemoryError) as failure:
         return line | {"outcome": "solver_failed", "reason": str(failure).replace("\n", " "), "verdict": "stopped"}
     difference = disagreement(simulation, other)
-    reached = (
-        simulation.failure or simulation.statistics.residuals
-    )  # of the step that was rejected, where there is one
+    reached = simulation.failure or simulation.statistics.residuals  # of the step that was rejected, where there is one
     line |= {"outcome": simulation.outcome, "disagreement": difference} | {
         key: reached.get(key, float("nan")) for key in BALANCES
     }
