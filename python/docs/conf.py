@@ -13,13 +13,14 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
+import gallery  # noqa: E402
 import generated  # noqa: E402
 
 project = "warmslip"
 author = "The warmslip authors"
 copyright = author
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
-exclude_patterns = ["conf.py", "generated.py", "README.md"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+exclude_patterns = ["conf.py", "generated.py", "gallery.py", "README.md"]
 html_theme = "furo"
 html_title = "warmslip"
 html_static_path = ["_static"]
@@ -43,6 +44,8 @@ _profile.mkdir()
 (_profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 'ERROR'\n")
 logging.getLogger("traitlets").setLevel(logging.WARNING)
 
+napoleon_google_docstring = False
+napoleon_use_rtype = False
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
@@ -53,6 +56,8 @@ python_maximum_signature_line_length = 80
 def _replaced(app: Any, name: str, source: list[str]) -> None:
     """Lines such as `% generated: scene` become what the function of that name in generated.py writes."""
     source[0] = re.sub(r"^% generated: (\w+)$", lambda m: getattr(generated, m[1])(), source[0], flags=re.MULTILINE)
+    if "% gallery" in source[0]:
+        source[0] = source[0].replace("% gallery", gallery.gallery())
 
 
 def _escaped(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -65,4 +70,4 @@ def _escaped(app: Any, what: str, name: str, thing: Any, options: Any, lines: li
 
 def setup(app: Any) -> None:
     app.connect("source-read", _replaced)
-    app.connect("autodoc-process-docstring", _escaped)
+    app.connect("autodoc-process-docstring", _escaped, priority=400)  # before napoleon reads the sections

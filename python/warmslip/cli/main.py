@@ -45,27 +45,32 @@ def logged(
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
-for command in (
-    scene.run,
-    scene.explain,
-    scene.export,
-    scene.view,
-    verify.check,
-    study.study,
-    study.manufactured,
-    study.extremes,
-    study.blocks,
-    study.rates,
-    study.readings,
-    study.work,
-    study.judge,
-    study.draw,
-    verify.verify,
-    verify.report,
-    scene.schema,
-):
-    app.command()(command)
-app.command("list")(scene.list_)
+# what a newcomer needs comes first in --help
+PANELS: dict[str, tuple[tuple[str, Any], ...]] = {
+    "Run a scene": (
+        ("list", scene.list_),
+        ("explain", scene.explain),
+        ("check", verify.check),
+        ("run", scene.run),
+        ("view", scene.view),
+        ("export", scene.export),
+    ),
+    "Measure and verify": (
+        ("study", study.study),
+        ("rates", study.rates),
+        ("draw", study.draw),
+        ("verify", verify.verify),
+        ("report", verify.report),
+        ("manufactured", study.manufactured),
+        ("extremes", study.extremes),
+        ("blocks", study.blocks),
+        ("schema", scene.schema),
+    ),
+    "Reproduce the paper": (("readings", study.readings), ("work", study.work), ("judge", study.judge)),
+}
+for panel, commands in PANELS.items():
+    for name, function in commands:
+        app.command(name, rich_help_panel=panel)(function)
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ def run(
         str, typer.Option(help='PETSc options, such as "-log_view -momentum_ksp_type cg"; see also PETSC_OPTIONS')
     ] = "",
 ) -> None:
-    """Run a scene. Exit code 0: completed; 1: stopped early, see the outcome; 2: invalid input; 130: interrupted, see --resume."""
+    """Run a scene. Exit code 0: completed; 1: stopped early; 2: invalid input; 130: interrupted, see --resume."""
     if backend not in ("automatic", "cholmod", "petsc"):
         raise SceneError(f"--backend '{backend}' is unknown; use automatic, cholmod or petsc")
     if dry_run:

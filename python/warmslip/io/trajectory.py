@@ -52,9 +52,21 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
 
 
 class Trajectory:
-    """Read access to a run: lazy datasets (`u`, `w`, `theta`, `time`), the `series` of every step, `contact` points.
+    """Read access to a stored run.
 
-    A field that the scene does not have is None.
+    Fields are read when they are indexed; a field that the scene does not have is None. Use it in a `with` block.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file trajectory.h5 of a run.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be opened.
+    ValueError
+        When it is no trajectory, or a damaged one.
     """
 
     def __init__(self, path: str | Path) -> None:

@@ -25,18 +25,28 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Law:
-    """Functions in the place of a contact part's own law, None for the one the scene states.
+    """Functions in the place of a contact part's own law, None for the one of the scene.
 
-    `compliance(r)`, for a penetration r > 0 (length), gives the pressure p_nu, its derivative and the energy per area, the
-    integral of p_nu from 0 to r; where r <= 0 nothing presses. `friction(pressure, speed)` gives the friction bound (stress) and
-    its derivatives by the pressure and by the slip speed. Both are called with floats at every contact point in every iteration,
-    which is slower than the laws of the scene. They generalise (2.8) and (2.9) of the paper: neither pressure nor bound may be
-    negative, and the pressure must not fall as r grows.
+    They generalise (2.8) and (2.9) of the paper. Both are called with floats at every contact point in every iteration, which
+    is slower than the laws of the scene. They are tried on samples before the run, and every value is checked in the run: a
+    step that meets a value that is none ends the run with the outcome `law_failed`. A derivative that is wrong beyond the
+    samples costs iterations only.
 
-    They are tried on samples before the run. In the run every value is checked: three finite numbers, no negative pressure or
-    bound, and a pressure and an energy that go with those of all other penetrations met so far. A step that meets another ends
-    the run with the outcome `law_failed` and the place. A derivative that is wrong beyond the samples costs iterations, no more.
-    Raises ValueError for a law without functions, TypeError for one that cannot be called.
+    Parameters
+    ----------
+    compliance : callable, optional
+        `compliance(r)` for a penetration r > 0 (length): the pressure p_nu (stress, not negative, not falling with r), its
+        derivative, and the energy per area, the integral of p_nu from 0 to r.
+    friction : callable, optional
+        `friction(pressure, speed)`: the friction bound (stress, not negative) and its derivatives by the pressure and by the
+        slip speed.
+
+    Raises
+    ------
+    ValueError
+        For a law without functions.
+    TypeError
+        For a function that cannot be called.
     """
 
     compliance: Callable[[float], Sequence[float]] | None = None

@@ -207,11 +207,32 @@ def discretise(
     laws: dict[str, Law] | None = None,
     mesh: Any = None,
 ) -> Discretisation:
-    """Assembles a scene on a communicator (default: all ranks).
+    """Assembles a scene (collective).
 
-    `loads` replaces the scene's, `mesh` its mesh, and `laws` the contact laws of the parts it names. Collective. Raises
-    TypeError for what is no scene, loads or laws, ValueError when the contact part has no free node, a law is none, or a support
-    that stays where it is holds a part inside a rigid foundation.
+    Parameters
+    ----------
+    scene : Scene
+        What to assemble.
+    comm : mpi4py communicator, optional
+        The ranks that share the mesh; all by default.
+    loads : Loads, optional
+        Loads in the place of the scene's.
+    laws : dict of Law, optional
+        Contact laws by part, in the place of the scene's.
+    mesh : _core.Mesh2 or _core.Mesh3, optional
+        Mesh in the place of the scene's.
+
+    Returns
+    -------
+    Discretisation
+        Mesh, operators, contact surface and load vectors.
+
+    Raises
+    ------
+    TypeError
+        For what is no scene, loads or laws.
+    ValueError
+        When a contact part has no free node, a law is none, or a support at rest holds a part inside a rigid foundation.
     """
     from mpi4py import MPI
 

@@ -49,13 +49,32 @@ def of_time(data: Data) -> bool:
 
 @dataclass(frozen=True)
 class Loads:
-    """Right-hand sides in the letters of the paper. Each value is a constant or a function (x, t) -> array.
+    """Right-hand sides in the letters of the paper. Each is a constant or a function (x, t) -> array.
 
-    body f0, source q0; traction fN and heat_flux h by boundary part (a flux into the body); displacement u_D and temperature
-    theta_D by supported part; contact_traction gC, an extra traction on all of Gamma_C for manufactured solutions;
-    contact_flux likewise; gap g and foundation_temperature theta_F on Gamma_C, one for all parts of it or a list with one for
-    each. `points` is the number of quadrature points per direction of the functions. A function that does not depend on time
-    may say so by an attribute `of_time = False`.
+    A function takes positions x (points, d) and the time; it returns (points,) or (points, components). A function that does
+    not depend on time may say so by an attribute `of_time = False`.
+
+    Parameters
+    ----------
+    body : datum
+        f0, force per volume.
+    source : datum
+        q0, heat per volume and time.
+    traction, heat_flux : dict of datum
+        fN (stress) and h (heat per area and time, into the body) by boundary part.
+    displacement, temperature : dict of datum
+        u_D (length) and theta_D by supported part.
+    contact_traction, contact_flux : datum
+        Extra traction and flux on all of Gamma_C, for manufactured solutions.
+    gap, foundation_temperature : datum or list of datum
+        g (length) and theta_F on Gamma_C: one for all contact parts, or one for each.
+    points : int
+        Quadrature points per direction for functions.
+
+    Raises
+    ------
+    TypeError
+        For a load that is not by part where it should be, and for a formula.
     """
 
     body: Data = 0.0

@@ -12,9 +12,14 @@ from warmslip.typing import Array
 
 
 class State:
-    """What a stepper holds after a step. Arrays are gathered when they are first asked for, on all ranks together (collective).
+    """What a stepper holds after a step.
 
-    A state that was not read in time, before the next step, raises RuntimeError.
+    Arrays are gathered when they are first read, on all ranks together (collective).
+
+    Raises
+    ------
+    RuntimeError
+        When a field is first read after the next step.
     """
 
     def __init__(self, discretisation: Discretisation, stepper: Any, step: int) -> None:

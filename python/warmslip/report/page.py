@@ -50,7 +50,7 @@ def view(
         here = state_number(t, at)
         found: dict[str, tuple[Any, str]] = {}
         last = body(t, d, here)
-        factor = _factor(t, d)
+        factor = magnification(t, d)
         if last.fields:
             found["body"] = drawings.bodies(last, factor)
         if parts := _parts(t, d, here):
@@ -108,7 +108,8 @@ def _surface(cells: Any) -> tuple[Any, Any]:
     return facets[alone], alone % len(cells)
 
 
-def _factor(t: Trajectory, d: Discretisation) -> float:
+def magnification(t: Trajectory, d: Discretisation) -> float:
+    """Factor by which displacements are drawn, the same for all states; dimensionless."""
     if t.u is None:
         return 1.0
     largest = max(float(np.abs(np.asarray(t.u[i])).max()) for i in range(len(t.time)))

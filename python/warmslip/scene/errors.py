@@ -12,7 +12,7 @@ from warmslip.scene.types import Table
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; the message is one sentence a problem, each with its key and its cure."""
+    """A scene that cannot be run. The message is one sentence a problem, each with its key and its cure."""
 
 
 M = TypeVar("M", bound=BaseModel)

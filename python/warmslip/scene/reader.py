@@ -24,10 +24,26 @@ def library() -> list[str]:
 
 
 def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
-    """Reads a scene by library name or path and applies `key=value` overrides.
+    """Reads a scene by library name or path and applies overrides.
 
-    Raises SceneError with a sentence for each problem: missing file, bad TOML, unknown key, wrong type, value out of range;
-    TypeError for arguments of another kind.
+    Parameters
+    ----------
+    scene : str or Path
+        Name of a scene of the library, or path of a TOML file.
+    overrides : list of str, optional
+        Keys to replace, written `table.key=value` as on the command line.
+
+    Returns
+    -------
+    Scene
+        The checked scene.
+
+    Raises
+    ------
+    SceneError
+        One sentence a problem: missing file, invalid TOML, unknown key, wrong type, value out of range.
+    TypeError
+        For arguments of another kind.
     """
     if not isinstance(scene, str | Path):
         raise TypeError(f"scene: {quoted(scene)} is neither a name of the library nor a path; give one")

@@ -31,9 +31,18 @@ Observer = Callable[[State, Any], None]
 
 @dataclass(frozen=True)
 class Result:
-    """The end of a run: `summary` as in summary.json and the final fields in mesh numbering, (nodes, d) and (nodes,).
+    """The end of a run.
 
-    A field that the scene does not have is None.
+    Attributes
+    ----------
+    summary : dict
+        The contents of summary.json.
+    u, w : array (nodes, d) or None
+        Displacement (length) and velocity at the end, in mesh numbering; None when nothing moves.
+    theta : array (nodes,) or None
+        Temperature at the end; None without heat.
+    trajectory : Path or None
+        The file trajectory.h5, when there is one.
     """
 
     summary: dict[str, Any]
@@ -65,21 +74,49 @@ def run(
     progress: Callable[[int, int, Any], None] | None = None,
     resume: bool = False,
 ) -> Result:
-    """Runs a scene. With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs.
+    """Runs a scene to its end.
 
-    With `resume`, goes on from the newest whole checkpoint in `out`, to the same end as the run that was not stopped, on one
-    process bit by bit, on several to rounding. Without one it starts from the beginning, unless this very run has ended right
-    there before: that is the result then. Functions in Python must be there again, and must be the same: only their names
-    are compared.
+    With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs. Collective over `comm`.
 
-    Collective over `comm` (default: all ranks). After every step the `observers` are called as `observer(state, report)` on every
-    rank, then `progress(step, steps, report)` on rank 0. A run that cannot go on returns normally: see `Result.outcome`, one of
-    completed, contact_not_converged, not_finite, data_not_finite (a load, a gap), support_inside_foundation,
-    law_failed (a law of one's own), balance_violated, precision_lost, unsupported, solver_failed (`failure` in the summary
-    has the step that was rejected), and interrupted after
-    Ctrl-C or SIGTERM, which leave a checkpoint.
-    Raises TypeError for arguments of another kind, ValueError for a scene, loads or laws that make no sense, OSError when `out`
-    cannot be written.
+    Parameters
+    ----------
+    scene : Scene
+        What to run.
+    out : str or Path, optional
+        Folder of the files; without it nothing is written.
+    comm : mpi4py communicator, optional
+        The ranks that run; all by default.
+    loads : Loads, optional
+        Loads in the place of the scene's.
+    laws : dict of Law, optional
+        Contact laws by part, in the place of the scene's.
+    backend : str
+        Factorization: automatic, cholmod or petsc.
+    observers : sequence of callables
+        Called as `observer(state, report)` after every step, on every rank.
+    progress : callable, optional
+        Called as `progress(step, steps, report)` after every step, on rank 0.
+    resume : bool
+        Continue from the newest whole checkpoint in `out`. On one process the end is bitwise that of an uninterrupted run; on
+        several it agrees to round-off. Without a checkpoint the run starts from the beginning, unless the same run was
+        completed in `out` before: its result is returned then. Python functions must be given again and must be the same; only
+        their names are compared.
+
+    Returns
+    -------
+    Result
+        Also of a run that stopped early: `outcome` is then one of contact_not_converged, not_finite, data_not_finite,
+        support_inside_foundation, law_failed, balance_violated, precision_lost, unsupported, solver_failed, or interrupted
+        (Ctrl-C, SIGTERM). `failure` in the summary describes the step that was rejected.
+
+    Raises
+    ------
+    TypeError
+        For arguments of another kind.
+    ValueError
+        For a scene, loads or laws that make no sense.
+    OSError
+        When `out` cannot be written.
     """
     refuse_types(scene, loads, laws)  # before anything in the folder is removed
     if callable(observers):

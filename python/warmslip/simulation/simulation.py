@@ -32,9 +32,33 @@ _fingerprint = cache(provenance.fingerprint)  # it reads every source, and this 
 class Simulation:
     """A scene being stepped: iterate `steps()`, or let `warmslip.run` do it.
 
-    `loads` and `laws` take the place of the scene's, see `discretise`. `discretisation` is the assembled problem, with matrices
-    as petsc4py objects; `stepper` has the factored operators `momentum_factor` and `heat_factor`, whose `solve` takes
-    petsc4py vectors; `statistics` counts residuals, errors and iterations.
+    Parameters
+    ----------
+    scene : Scene
+        What to step.
+    comm : mpi4py communicator, optional
+        The ranks that step; all by default.
+    loads : Loads, optional
+        Loads in the place of the scene's.
+    laws : dict of Law, optional
+        Contact laws by part, in the place of the scene's.
+    backend : str
+        Factorization: automatic, cholmod or petsc.
+    discretisation : Discretisation, optional
+        The scene assembled before.
+
+    Attributes
+    ----------
+    discretisation : Discretisation
+        The assembled problem, with matrices as petsc4py objects.
+    stepper : _core.Stepper
+        The time stepper; `momentum_factor` and `heat_factor` are the factored operators.
+    statistics : Statistics
+        Largest balance residuals, estimated errors and iterations so far.
+    outcome : str
+        `completed`, or the name of what stopped the run.
+    failure : dict or None
+        Step, reason and residuals of a step that was rejected.
     """
 
     def __init__(
