@@ -1,9 +1,15 @@
 #!/usr/bin/env bash
-# The site into build/docs; warnings are errors. Installs the extra `docs` first when it is missing. Arguments go to sphinx-build.
+# The site into build/docs; warnings are errors. Installs the extra `docs` and Doxygen first when they are missing. Arguments go to sphinx-build.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . workflows/env.sh
-if ! python -c 'import furo, ipykernel, jupytext, myst_nb, sphinx' 2>/dev/null; then
+if ! command -v doxygen >/dev/null; then
+  echo "== installing Doxygen (half a minute)" >&2
+  as_root=()
+  ((EUID)) && as_root=(sudo)
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends doxygen >/dev/null
+fi
+if ! python -c "import breathe, furo, ipykernel, jupytext, myst_nb, sphinx" 2>/dev/null; then
   echo "== installing what builds the site (about a minute)" >&2
   mapfile -t extra < <(python - <<'PYTHON'
 import tomllib

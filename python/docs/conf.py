@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -19,7 +20,7 @@ import generated  # noqa: E402
 project = "warmslip"
 author = "The warmslip authors"
 copyright = author
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon", "breathe"]
 exclude_patterns = ["conf.py", "generated.py", "gallery.py", "README.md"]
 html_theme = "furo"
 html_title = "warmslip"
@@ -44,6 +45,9 @@ _profile.mkdir()
 (_profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 'ERROR'\n")
 logging.getLogger("traitlets").setLevel(logging.WARNING)
 
+breathe_projects = {"warmslip": str(HERE.parents[1] / "build/doxygen/xml")}
+breathe_default_project = "warmslip"
+suppress_warnings = ["duplicate_declaration.cpp"]  # the namespace stands in every header
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 autodoc_typehints = "signature"
@@ -69,5 +73,7 @@ def _escaped(app: Any, what: str, name: str, thing: Any, options: Any, lines: li
 
 
 def setup(app: Any) -> None:
+    (HERE.parents[1] / "build/doxygen").mkdir(parents=True, exist_ok=True)
+    subprocess.run(["doxygen", str(HERE / "Doxyfile")], cwd=HERE.parents[1], check=True)
     app.connect("source-read", _replaced)
     app.connect("autodoc-process-docstring", _escaped, priority=400)  # before napoleon reads the sections

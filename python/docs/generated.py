@@ -184,15 +184,21 @@ def _type(text: str) -> str:
 
 
 def headers() -> str:
-    """The modules of ARCHITECTURE.md, each header with its first comment and its text."""
+    """The modules of ARCHITECTURE.md, each header with its first comment and what Doxygen reads of it."""
     rows = re.findall(r"^\| `cpp/warmslip/(\w+)` \| (.*) \|$", (ROOT / "ARCHITECTURE.md").read_text(), re.MULTILINE)
     out: list[str] = []
     for module, what in rows:
         out += ["", f"## {module}", "", f"{what[0].upper()}{what[1:]}."]
         for path in sorted((HEADERS / module).glob("*.hpp")):
-            text = path.read_text()
-            first = re.match(r"(//.*\n)+", text)
+            first = re.match(r"(//.*\n)+", path.read_text())
             sentence = " ".join(re.findall(r"^// ?(.*)$", first[0], re.MULTILINE)) if first else ""
-            out += ["", f"### {path.stem}", "", _cell(sentence), "", f"<details><summary>{path.name}</summary>", ""]
-            out += ["```cpp", text.rstrip(), "```", "", "</details>"]
+            out += ["", f"### {path.name}", "", _cell(sentence), "", "```{eval-rst}", *_shown(path), "```"]
     return "\n".join(out)
+
+
+def _shown(path: Path) -> list[str]:
+    """The directives of breathe for a header; breathe knows files by their names alone, so that of two it shows the types."""
+    if len(list(HEADERS.rglob(path.name))) == 1:
+        return [f".. doxygenfile:: {path.name}"]
+    types = re.findall(r"^(?:struct|class) (\w+) \{", path.read_text(), re.MULTILINE)
+    return [line for name in types for line in (f".. doxygenstruct:: warmslip::{name}", "   :members:", "")]

@@ -21,5 +21,8 @@ def test_a_public_name_says_what_it_takes_and_raises(name: str) -> None:
         assert {"Parameters", "Returns", "Raises"} <= set(found)
         for parameter in inspect.signature(thing).parameters:
             assert re.search(rf"^{parameter} : ", text, re.MULTILINE), f"{name} does not document '{parameter}'"
-    elif not issubclass(thing, Exception) and name not in ("Scene", "Discretisation"):  # their fields are documented one by one
+    elif not issubclass(thing, Exception) and name not in (
+        "Scene",
+        "Discretisation",
+    ):  # their fields are documented one by one
         assert set(found) & set(SECTIONS), f"{name} has no section"
