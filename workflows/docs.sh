@@ -7,6 +7,7 @@ if ! command -v doxygen >/dev/null; then
   echo "== installing Doxygen (half a minute)" >&2
   as_root=()
   ((EUID)) && as_root=(sudo)
+  "${as_root[@]}" apt-get update -qq
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends doxygen >/dev/null
 fi
 if ! python -c "import breathe, furo, ipykernel, jupytext, myst_nb, sphinx" 2>/dev/null; then
