@@ -116,7 +116,7 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
 
     (tmp_path / "other").mkdir()
     (tmp_path / "other/sitecustomize.py").write_text(
-        "import warmslip.provenance\nwarmslip.provenance.fingerprint = lambda: 'another core'\n"
+        "import warmslip.records.provenance as provenance\nprovenance.fingerprint = lambda: 'another core'\n"
     )
     other = plan(snakemake("--dry-run", "--quiet", "rules", *small, PYTHONPATH=str(tmp_path / "other")))
     everything = plan(snakemake("--dry-run", "--quiet", "rules", "--forceall", *small))

@@ -90,8 +90,7 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactP
 // The law's residual at the velocities of `at` and the forces in its value, with own compliances that are so many times
 // smaller.
 template <int d>
-void ContactSolver<d>::apply_regularised_law(const ContactProblem<d>& problem, double firmness,
-                                             Linearisation& at) const {
+void ContactSolver<d>::apply_law(const ContactProblem<d>& problem, double firmness, Linearisation& at) const {
   at.points.resize(problem.points.size());
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i) * d;
@@ -113,7 +112,7 @@ typename ContactSolver<d>::Linearisation ContactSolver<d>::linearise(const Conta
                                                                      const Eigen::VectorXd& added,
                                                                      const Eigen::VectorXd& rigid) const {
   Linearisation at = motion(problem, added, rigid);
-  apply_regularised_law(problem, 1, at);
+  apply_law(problem, 1, at);
   return at;
 }
 
@@ -327,7 +326,7 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
   template PointCompliance ContactSolver<d>::diagonal_block(const ContactProblem<d>&, std::size_t) const;             \
   template ContactSolver<d>::Linearisation ContactSolver<d>::motion(const ContactProblem<d>&, const Eigen::VectorXd&, \
                                                                     const Eigen::VectorXd&) const;                    \
-  template void ContactSolver<d>::apply_regularised_law(const ContactProblem<d>&, double, Linearisation&) const;      \
+  template void ContactSolver<d>::apply_law(const ContactProblem<d>&, double, Linearisation&) const;                  \
   template ContactSolver<d>::Linearisation ContactSolver<d>::linearise(                                               \
       const ContactProblem<d>&, const Eigen::VectorXd&, const Eigen::VectorXd&) const;                                \
   template void ContactSolver<d>::factor(const ContactProblem<d>&, const Linearisation&, ContactSolution<d>&);        \

@@ -40,7 +40,7 @@ class ContactSolver {
   };
   Linearisation motion(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                        const Eigen::VectorXd& rigid) const;
-  void apply_regularised_law(const ContactProblem<d>& problem, double firmness, Linearisation& at) const;
+  void apply_law(const ContactProblem<d>& problem, double firmness, Linearisation& at) const;
   Linearisation linearise(const ContactProblem<d>& problem, const Eigen::VectorXd& added,
                           const Eigen::VectorXd& rigid) const;
   void prescribed(const ContactProblem<d>& problem, Linearisation& at, std::size_t point) const;

@@ -43,7 +43,7 @@ bool ContactSolver<d>::convex(const ContactProblem<d>& problem, const Eigen::Vec
     at.value.tail(motions) += lent_mass_ * (rigid - motions_before);
     const Eigen::VectorXd force = at.value.head(all);
     at.value.head(all) = centre;
-    apply_regularised_law(problem, firmness, at);
+    apply_law(problem, firmness, at);
     at.value.head(all) += force - centre;
     for (auto& point : at.points) point.by_force.setIdentity();
     return at;

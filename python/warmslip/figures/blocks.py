@@ -76,7 +76,7 @@ def _floor(ax: Axes, lines: list[dict[str, str]]) -> str:
     ax.set(
         xscale="log",
         xlabel="least code, ms a step",
-        ylim=(0.75, max(1.75, 1.3 * column(lines, "over_floor_upper").max())),
+        ylim=(0.75, max(1.75, 1.3 * column(lines, "step_over_minimal_upper").max())),
     )
     ax.set_ylabel("time over the least code")
     ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -17,7 +17,7 @@ from warmslip.figures.style import GREY, INK, ORANGE, PALE, PURPLE, SKY, TERMS, 
 from warmslip.records import tables
 
 OUTCOMES = {
-    "right": SKY,
+    "completed": SKY,
     "refused": PALE,
     "contact_not_converged": ORANGE,
     "not_finite": PURPLE,

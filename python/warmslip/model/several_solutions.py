@@ -123,7 +123,7 @@ def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touch
     except ValueError as error:
         return Finding(coefficients, 0.0, reason=str(error))
     points = points.of(np.ones(len(points.weights), dtype=bool) if touching is None else touching).rubbing
-    straight = all(c.exponent == 1 and c.pressure_limit is None for c in contacts) and not d.own
+    straight = all(c.linear for c in contacts) and not d.own
     simple = all(
         c.friction is None or not (c.friction.limit or c.friction.regularisation or c.friction.cohesion)
         for c in contacts

@@ -109,7 +109,7 @@ def full_model(scene: Scene) -> FullScene:
         problems.append("contact: one contact part with a stiffness is needed here")
     else:
         contact = scene.contacts[0]
-        if contact.rigid or contact.exponent != 1 or contact.pressure_limit or contact.heats:
+        if contact.rigid or not contact.linear or contact.heats:
             problems.append("contact: only linear compliance with a constant conductance can be judged here")
         if contact.friction and contact.friction != FrictionTable(coefficient=contact.friction.coefficient):
             problems.append("contact.friction: only Coulomb's law with a constant coefficient can be judged here")

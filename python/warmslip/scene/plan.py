@@ -186,7 +186,7 @@ def _heat_by_contact(touching: list[ContactTable]) -> list[str]:
 def _piecewise_linear(c: ContactTable) -> bool:
     f = c.friction
     straight = f is None or not (f.speed or f.limit or f.regularisation)
-    return c.exponent == 1 and c.pressure_limit is None and straight
+    return c.linear and straight
 
 
 def _kept(scene: Scene) -> list[str]:

@@ -308,6 +308,11 @@ class ContactTable(Table):
         return self
 
     @property
+    def linear(self) -> bool:
+        """Whether the pressure is proportional to the penetration, or the foundation rigid."""
+        return self.exponent == 1 and self.pressure_limit is None
+
+    @property
     def rigid(self) -> bool:
         """Whether the foundation lets nothing in."""
         return self.stiffness == "rigid"
