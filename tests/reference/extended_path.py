@@ -16,7 +16,7 @@ from reference.extended_numbers import ONE, ZERO, Big, above, big, largest, mid,
 
 OPEN, TOUCHING, CAPPED = range(3)
 STICK, PLUS, MINUS = 0, 1, -1
-LONGEST = 300  # pieces of a path
+MAX_PIECES = 300  # pieces of a path
 ROUNDS = 20  # of tangents to laws that bend
 PARTS = 300  # of a continuation
 Side = tuple[
@@ -86,7 +86,7 @@ def path(contact: Contact, seed: int = 0) -> Big | None:
     ]
     t, upwards = ZERO, True
     entered: tuple[int, str] | None = None
-    for _ in range(LONGEST):
+    for _ in range(MAX_PIECES):
         at, slope = line(contact, start, pieces)
         sides = limits(contact, start, pieces, at, slope)
         if entered is not None:

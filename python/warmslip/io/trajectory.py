@@ -16,7 +16,7 @@ from warmslip.typing import Array
 
 CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
 THE_FILE = "give the trajectory.h5 that `warmslip run` wrote"
-DENSEST = 1000  # bytes from a byte of a file that somebody compressed
+MAX_COMPRESSION = 1000  # bytes from a byte of a file that somebody compressed
 
 
 def _check(file: h5py.File) -> None:
@@ -46,7 +46,7 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
         raise ValueError(f"{name} is missing or does not hold numbers of the kind it should")
     if len(data.shape) != len(shape) or any(n not in (m, None) for m, n in zip(data.shape, shape, strict=True)):
         raise ValueError(f"{name} has shape {data.shape}")
-    if data.nbytes > DENSEST * file.id.get_filesize():
+    if data.nbytes > MAX_COMPRESSION * file.id.get_filesize():
         raise ValueError(f"{name} has more numbers than the file can hold")
     return tuple(data.shape)
 

@@ -19,7 +19,7 @@ from warmslip.typing import Array
 REPORT = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 BALANCES = tuple(Balances.terms)
 # held back before it is written: bytes, seconds
-LARGEST, LONGEST = 2**25, 1.0
+MAX_BUFFER_BYTES, MAX_BUFFER_SECONDS = 2**25, 1.0
 SPARE = 2**19  # bytes that are kept free for closing the file: HDF5 does not survive a full disk
 
 
@@ -82,7 +82,7 @@ class TrajectoryWriter:
         file = self._file = h5py.File(path, "w", libver="latest")
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
         file.attrs["digest"] = discretisation.scene.digest()
-        file.attrs["functions"] = json.dumps(discretisation.own)
+        file.attrs["functions"] = json.dumps(discretisation.user_functions)
         file["mesh/nodes"] = discretisation.mesh.nodes
         file["mesh/cells"] = discretisation.mesh.cells
         for name, facets in discretisation.mesh.parts.items():
@@ -195,7 +195,7 @@ class TrajectoryWriter:
                 self._append("contact/gap", gap)
         if self._writing and taken % scene.output.every == 0:
             self._state()
-        if self._held > LARGEST or time.monotonic() - self._written > LONGEST:
+        if self._held > MAX_BUFFER_BYTES or time.monotonic() - self._written > MAX_BUFFER_SECONDS:
             self.write()
 
     def __enter__(self) -> Self:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warmslip.mesh import gmsh
 
-LARGEST = 2**31  # bytes of a file that is read
+MAX_MESH_BYTES = 2**31  # bytes of a file that is read
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def read(name: str) -> MeshFile:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no such file"
         raise ValueError(f"mesh file '{name}' cannot be read ({reason}); check the path") from None
-    if not path.is_file() or not 0 < status.st_size <= LARGEST:
+    if not path.is_file() or not 0 < status.st_size <= MAX_MESH_BYTES:
         raise ValueError(f"mesh file '{name}' is empty or no file of at most 2 GB; check the path")
     return _read(path, name, status.st_mtime_ns)
 

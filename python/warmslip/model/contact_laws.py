@@ -13,12 +13,12 @@ import numpy as np
 from warmslip.typing import Array
 
 AGREEING = 0.9  # share of the samples whose derivative must be the difference quotient: a law may have kinks
-NEAR = 1e-3  # how close the two must be, relative
-EXACT = 1e-6  # relative, of an energy against its pressure: an energy found by quadrature may be so far off
+DERIVATIVE_TOLERANCE = 1e-3  # how close the two must be, relative
+ENERGY_TOLERANCE = 1e-6  # relative, of an energy against its pressure: an energy found by quadrature may be so far off
 CANCELLED = 1e-12  # relative to the largest of the trial: a formula may lose the digits of small values
-OFF = 0.97531  # from round numbers, where kinks are: factor of the places of the trial
-DEEPEST = 1e-2  # penetration of the trial, over the size of the body
-APART = 1.02  # ratio of the penetrations that are remembered
+SAMPLE_FACTOR = 0.97531  # from round numbers, where kinks are: factor of the places of the trial
+MAX_SAMPLE_PENETRATION = 1e-2  # penetration of the trial, over the size of the body
+MEMORY_RATIO = 1.02  # ratio of the penetrations that are remembered
 
 Triple = tuple[float, float, float]
 
@@ -70,15 +70,15 @@ class Law:
         Raises ValueError with the place where a function is not what it should be.
         """
         watched = CheckedLaw.of(part, self, length)
-        pressures = OFF * np.geomspace(1e-6, 1e2, 9)
+        pressures = SAMPLE_FACTOR * np.geomspace(1e-6, 1e2, 9)
         if watched.compliance is not None:
-            r = OFF * np.geomspace(1e-8, DEEPEST, 61) * length
+            r = SAMPLE_FACTOR * np.geomspace(1e-8, MAX_SAMPLE_PENETRATION, 61) * length
             pressures = np.array([watched.compliance.validate(float(one))[0] for one in r])[::8]
             _derives(watched.compliance, r[:, None], axis=0)
         if watched.friction is not None:
             for p in (0.0, *pressures):
                 watched.friction.validate(float(p), 0.0)
-            places = [(p, speed) for p in pressures if p > 0 for speed in OFF * np.geomspace(1e-3, 10, 9)]
+            places = [(p, speed) for p in pressures if p > 0 for speed in SAMPLE_FACTOR * np.geomspace(1e-3, 10, 9)]
             for axis in (0, 1) if places else ():
                 _derives(watched.friction, np.array(places), axis=axis)
         return watched
@@ -137,7 +137,7 @@ class CheckedCompliance(CheckedFunction):
 
     def __init__(self, name: str, function: Callable[..., Sequence[float]], length: float) -> None:
         super().__init__(name, function, length)
-        self._met = [(0.0, 0.0, 0.0)]  # penetration, pressure, energy: ascending, at least a ratio APART
+        self._met = [(0.0, 0.0, 0.0)]  # penetration, pressure, energy: ascending, at least a ratio MEMORY_RATIO
         self._most = 0.0, 0.0  # pressure and energy of the trial
 
     @property
@@ -148,7 +148,7 @@ class CheckedCompliance(CheckedFunction):
     def validate(self, *place: float) -> Triple:
         (r,) = place
         pressure, slope, energy = super().validate(r)
-        if r <= DEEPEST * self._length:
+        if r <= MAX_SAMPLE_PENETRATION * self._length:
             self._most = max(self._most[0], pressure), max(self._most[1], energy)
         here, at = (r, pressure, energy), bisect.bisect(self._met, (r,))
         under, over = self._met[at - 1], self._met[at : at + 1]
@@ -156,26 +156,26 @@ class CheckedCompliance(CheckedFunction):
         for pair in pairs:
             self._does_not_fall(*pair)
         off = CANCELLED * self._most[1]
-        if not -off <= energy <= r * pressure * (1 + EXACT) + off:
+        if not -off <= energy <= r * pressure * (1 + ENERGY_TOLERANCE) + off:
             raise ValueError(
                 f"{self.name}({r:.3g}): the energy is {energy:.6g}, and the integral from 0 of a pressure that does not "
                 f"fall lies between 0 and {r * pressure:.6g}; it starts at 0"
             )
         for pair in pairs:
             self._is_the_integral(*pair)
-        if r > APART * under[0] and all(one[0] > APART * r for one in over):
+        if r > MEMORY_RATIO * under[0] and all(one[0] > MEMORY_RATIO * r for one in over):
             self._met.insert(at, here)
         return pressure, slope, energy
 
     def _does_not_fall(self, one: Triple, other: Triple) -> None:
-        if one[1] > other[1] * (1 + EXACT) + CANCELLED * self._most[0]:
+        if one[1] > other[1] * (1 + ENERGY_TOLERANCE) + CANCELLED * self._most[0]:
             raise ValueError(f"{self.name}: the pressure falls from r = {one[0]:.3g} to {other[0]:.3g}; it must not")
 
     def _is_the_integral(self, one: Triple, other: Triple) -> None:
         """The energy of a pressure that does not fall grows by something between the lower and the upper rectangle."""
         (r, p, energy), (r_next, p_next, energy_next) = one, other
         low, high, grown = p * (r_next - r), p_next * (r_next - r), energy_next - energy
-        off = EXACT * energy_next + CANCELLED * self._most[1]
+        off = ENERGY_TOLERANCE * energy_next + CANCELLED * self._most[1]
         if not low - off <= grown <= high + off:
             raise ValueError(
                 f"{self.name}: from r = {r:.6g} to {r_next:.6g} the energy grows by {grown:.9g} and the pressure gives "
@@ -220,7 +220,7 @@ def _derives(law: CheckedFunction, places: Array, *, axis: int) -> None:
     over, under, here = (values(places + sign * step) for sign in (1, -1, 0))
     quotient, stated = (over[0] - under[0]) / (2 * step[:, axis]), here[1 + axis]
     size = np.maximum(np.abs(quotient), np.abs(stated))
-    wrong = np.abs(quotient - stated) > NEAR * size + 1e-9 * np.abs(here[0]) / places[:, axis]
+    wrong = np.abs(quotient - stated) > DERIVATIVE_TOLERANCE * size + 1e-9 * np.abs(here[0]) / places[:, axis]
     if wrong.mean() > 1 - AGREEING:
         i = int(np.flatnonzero(wrong)[0])
         at = ", ".join(f"{x:.3g}" for x in places[i])

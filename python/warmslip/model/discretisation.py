@@ -41,7 +41,7 @@ class Discretisation:
     load_vectors: LoadVectors
     laws: list[CheckedLaw]  # functions in the place of the scene's laws
     prescribed: PrescribedContact  # contact points that supports hold
-    own: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
+    user_functions: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
 
     @property
     def dim(self) -> int:
@@ -243,7 +243,9 @@ def discretise(
     loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
     watched = _checked(laws or {}, scene, mesh)
-    own = ["loads"] * given_loads + [name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)]
+    user_functions = ["loads"] * given_loads + [
+        name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)
+    ]
     given, regions = materials(scene, mesh)
     problem = of_dim("Problem", d)(
         mesh=mesh,
@@ -264,7 +266,7 @@ def discretise(
             )
     operators = of_dim("Operators", d)(layout, problem)
     vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
-    rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in own)
+    rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in user_functions)
     prescribed = PrescribedContact(scene, mesh, surface, loads, vectors, rigid)
     if not prescribed.of_time and (why := prescribed.inside(0.0)):
         raise ValueError(f"supports.displacement: {why}")
@@ -280,7 +282,7 @@ def discretise(
         vectors,
         list(watched.values()),
         prescribed,
-        own,
+        user_functions,
     )
 
 

@@ -20,14 +20,14 @@ ROUNDING = 1e-12  # relative to displacement and gap: what the law of contact do
 
 @dataclass(frozen=True)
 class PrescribedContact:
-    """Of one problem; `own` names the parts whose compliance is a function of the user's."""
+    """Of one problem; `user_compliances` names the parts whose compliance is a function of the user's."""
 
     scene: Scene
     mesh: Any
     surface: Any
     loads: Loads
     vectors: LoadVectors
-    own: frozenset[str]
+    user_compliances: frozenset[str]
 
     @cached_property
     def _points(self) -> list[tuple[int, Any, Array]]:
@@ -39,7 +39,7 @@ class PrescribedContact:
         out: list[tuple[int, Any, Array]] = []
         for i, contact in enumerate(self.scene.contacts):
             facets = np.asarray(self.mesh.parts[contact.part])
-            if contact.stiffness is None or not np.isinf(contact.compliance) or contact.part in self.own:
+            if contact.stiffness is None or not np.isinf(contact.compliance) or contact.part in self.user_compliances:
                 continue
             points = np.flatnonzero(of_part == i)
             if not len(points) or not held[facets].any():

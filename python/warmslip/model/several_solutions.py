@@ -66,7 +66,7 @@ def condensed(d: Discretisation, stepper: Any) -> ContactPoints:
             raise ValueError("nothing but its contact holds the body")
         compliance += motions @ np.linalg.solve(inertia, motions.T)
     part, contacts = np.asarray(d.surface.contacts, dtype=int), d.scene.contacts
-    rises = [math.inf if f"laws.{c.part}.compliance" in d.own else steepest(c) for c in contacts]
+    rises = [math.inf if f"laws.{c.part}.compliance" in d.user_functions else steepest(c) for c in contacts]
     return ContactPoints(
         compliance=compliance,
         normals=np.asarray(d.surface.normals),
@@ -74,7 +74,9 @@ def condensed(d: Discretisation, stepper: Any) -> ContactPoints:
         step=d.scene.step,
         stiffness=np.array(rises)[part],
         friction=np.array([_coefficient(c) for c in contacts])[part],
-        rubs=np.array([c.friction is not None or f"laws.{c.part}.friction" in d.own for c in contacts])[part],
+        rubs=np.array([c.friction is not None or f"laws.{c.part}.friction" in d.user_functions for c in contacts])[
+            part
+        ],
     )
 
 
@@ -112,7 +114,7 @@ def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touch
     depends on the slip speed has none of this.
     """
     contacts = [c for c in d.scene.contacts if c.compliance > 0]
-    own = [name for name in d.own if name.endswith(".friction")]
+    own = [name for name in d.user_functions if name.endswith(".friction")]
     coefficients = tuple(sorted({_coefficient(c) for c in contacts} - {0.0}))
     if own or any(c.friction is not None and c.friction.speed for c in contacts if _coefficient(c)):
         return Finding(coefficients, 0.0, reason="friction depends on the slip speed")
@@ -123,7 +125,7 @@ def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touch
     except ValueError as error:
         return Finding(coefficients, 0.0, reason=str(error))
     points = points.of(np.ones(len(points.weights), dtype=bool) if touching is None else touching).rubbing
-    straight = all(c.linear for c in contacts) and not d.own
+    straight = all(c.linear for c in contacts) and not d.user_functions
     simple = all(
         c.friction is None or not (c.friction.limit or c.friction.regularisation or c.friction.cohesion)
         for c in contacts

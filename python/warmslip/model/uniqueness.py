@@ -39,7 +39,7 @@ SMALL, DENSE = (
     600,
 )  # unknowns up to which Lanczos's method is not worth it; and up to which points have weights of their own
 TRIES, TOP, SHARP, WORST = 120, 8, 40.0, 1e3
-LARGEST = 16.0  # logarithm of a weight, where the bound grows beyond all limits
+MAX_LOG_WEIGHT = 16.0  # logarithm of a weight, where the bound grows beyond all limits
 COARSE = (  # p, t of all points, the likely ones first
     *itertools.product((4.0, 1.0), (4.0, 16.0, 1.0)),
     *itertools.product((4.0, 1.0), (0.25, 64.0, 256.0)),
@@ -221,7 +221,7 @@ def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
         first,
         jac=True,
         method="L-BFGS-B",
-        bounds=[(-LARGEST, LARGEST)] * len(first),
+        bounds=[(-MAX_LOG_WEIGHT, MAX_LOG_WEIGHT)] * len(first),
         options={"maxfun": tries, "maxcor": 20},
     )
     return best

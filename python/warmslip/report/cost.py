@@ -22,7 +22,11 @@ from warmslip.scene.scene import Scene
 from warmslip.simulation.run import finish, run
 from warmslip.simulation.simulation import Simulation
 
-FEW, MANY, LONG_ENOUGH = 5, 60, 0.3  # trial steps at least, and at most when they are quick; seconds
+MIN_TRIAL_STEPS, MAX_TRIAL_STEPS, TRIAL_SECONDS = (
+    5,
+    60,
+    0.3,
+)  # trial steps at least, and at most when they are quick; seconds
 
 
 @dataclass
@@ -57,17 +61,22 @@ def trial(simulation: Simulation, folder: Path) -> Trial:
             writer.step(report, simulation.taken)
             now = time.perf_counter()
             found.steps.append(now - before)
-            if simulation.taken in (FEW, 2 * FEW):  # the first time files grow their first blocks
+            if simulation.taken in (
+                MIN_TRIAL_STEPS,
+                2 * MIN_TRIAL_STEPS,
+            ):  # the first time files grow their first blocks
                 few = _timed(writer.write)
                 found.extra += few
             if simulation.comm.bcast(
-                simulation.taken >= MANY or (simulation.taken >= FEW and now - begin > LONG_ENOUGH), root=0
+                simulation.taken >= MAX_TRIAL_STEPS
+                or (simulation.taken >= MIN_TRIAL_STEPS and now - begin > TRIAL_SECONDS),
+                root=0,
             ):
                 break
             before = time.perf_counter()
-        flush, more = _timed(writer.write), simulation.taken - 2 * FEW
-        if more > FEW:
-            found.storing = max(0.0, (flush - few) / (more - FEW))
+        flush, more = _timed(writer.write), simulation.taken - 2 * MIN_TRIAL_STEPS
+        if more > MIN_TRIAL_STEPS:
+            found.storing = max(0.0, (flush - few) / (more - MIN_TRIAL_STEPS))
         saving = _timed(lambda: simulation.take_checkpoint().write(folder))
         found.checkpoint = flush + saving
         found.extra += saving

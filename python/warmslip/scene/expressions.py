@@ -33,7 +33,7 @@ FUNCTIONS = frozenset(
     | {"abs", "floor", "ceil", "where", "min", "max"}
 )
 VARIABLES = ("x", "y", "z", "t")
-LONGEST = 2000  # characters: what a person writes
+MAX_FORMULA_CHARS = 2000  # characters: what a person writes
 NODES = (
     *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.Call, ast.Name, ast.Constant, ast.Load),
     *(ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.Mod, ast.USub, ast.UAdd, ast.And, ast.Or),
@@ -105,8 +105,8 @@ class Expression:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        if len(text) > LONGEST:
-            raise ValueError(f"a formula of {len(text)} characters; at most {LONGEST} are read")
+        if len(text) > MAX_FORMULA_CHARS:
+            raise ValueError(f"a formula of {len(text)} characters; at most {MAX_FORMULA_CHARS} are read")
         if "\0" in text:
             raise ValueError("a formula has no null bytes; remove them")
         try:

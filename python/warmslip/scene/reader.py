@@ -14,7 +14,7 @@ from warmslip.scene.errors import SceneError, validated
 from warmslip.scene.overrides import parse, replace
 from warmslip.scene.scene import Scene
 
-LARGEST, DEEPEST = 10**6, 50  # of a scene file: characters, dots in a key
+MAX_SCENE_CHARS, MAX_KEY_DOTS = 10**6, 50  # of a scene file: characters, dots in a key
 
 
 def library() -> list[str]:
@@ -57,18 +57,18 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
     else:
         try:
             with path.open() as file:
-                text = file.read(LARGEST + 1)
+                text = file.read(MAX_SCENE_CHARS + 1)
         except (OSError, ValueError) as error:  # ValueError: bytes that are no text, or a null byte in the name
             reason = error.strerror if isinstance(error, OSError) else "not a text file"
             near = difflib.get_close_matches(str(scene), library(), 1)
             hint = f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}"
             raise SceneError(f"cannot read scene '{scene}' ({reason}); {hint}") from None
-    if len(text) > LARGEST:
-        raise SceneError(f"scene '{scene}' is longer than {LARGEST} characters; keep meshes and tables outside")
+    if len(text) > MAX_SCENE_CHARS:
+        raise SceneError(f"scene '{scene}' is longer than {MAX_SCENE_CHARS} characters; keep meshes and tables outside")
     if any(
-        piece.count(".") > DEEPEST for piece in re.split(r"[=\[\]{},\n]", text)
+        piece.count(".") > MAX_KEY_DOTS for piece in re.split(r"[=\[\]{},\n]", text)
     ):  # tomllib takes the square of their number
-        raise SceneError(f"scene '{scene}' has a key with more than {DEEPEST} dots; correct it")
+        raise SceneError(f"scene '{scene}' has a key with more than {MAX_KEY_DOTS} dots; correct it")
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -173,7 +173,7 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
     """The result in a folder where this very run was completed before (collective). Python functions are compared by name."""
     found: Result | None = None
     if (
-        simulation.comm.rank == 0 and not simulation.discretisation.own and (folder / "final.vtu").exists()
+        simulation.comm.rank == 0 and not simulation.discretisation.user_functions and (folder / "final.vtu").exists()
     ):  # else the disk was full
         try:
             answer = json.loads((folder / "summary.json").read_text())

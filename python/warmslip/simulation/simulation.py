@@ -163,7 +163,7 @@ class Simulation:
             "code": _fingerprint(),
             "solver": stepper.solver,
             "ranks": self.comm.size,
-            "set of Python functions": list(d.own),
+            "set of Python functions": list(d.user_functions),
         }
         return Checkpoint(
             owner, self.taken, stepper.time, self.statistics, self.monitor.seen, list(stepper.extents), arrays

@@ -39,7 +39,7 @@ def summary(simulation: Simulation) -> dict[str, Any]:
         "warnings": simulation.warnings(),
         "time": s.time,
         "steps": simulation.taken,
-        "functions": d.own,
+        "functions": d.user_functions,
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
         "contact": contact | counts | {"traction": traction, "parts": parts},

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from warmslip.model.discretisation import Discretisation
 from warmslip.scene.full import FullScene
 
-LARGEST = 2.0  # exponents beyond it do not limit P1 elements
+MAX_EXPONENT = 2.0  # exponents beyond it do not limit P1 elements
 
 
 @dataclass(frozen=True)
 class Corner:
-    """A boundary node where the direction or the condition changes; exponents are capped at LARGEST, nan if undefined."""
+    """A boundary node where the direction or the condition changes; exponents are capped at MAX_EXPONENT, nan if undefined."""
 
     point: tuple[float, float]
     angle: float  # of the body, radians
@@ -31,7 +31,7 @@ class Corner:
 
 
 def elastic_exponent(lam: float, mu: float, angle: float, clamped: tuple[bool, bool]) -> float:
-    """Smallest positive real part of L, at most LARGEST, for the plane Lame pair (lam, mu). Raises ValueError for mu <= 0.
+    """Smallest positive real part of L, at most MAX_EXPONENT, for the plane Lame pair (lam, mu). Raises ValueError for mu <= 0.
 
     clamped-clamped  sin^2(L a) = L^2 sin^2(a) / c^2;  free-free  sin^2(L a) = L^2 sin^2(a), its rotation L = 1 excluded;
     clamped-free     sin^2(L a) = (c + 1)^2 / (4 c) - L^2 sin^2(a) / c;  c = (lam + 3 mu) / (lam + mu).
@@ -47,15 +47,15 @@ def elastic_exponent(lam: float, mu: float, angle: float, clamped: tuple[bool, b
     def slope_of(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
         return np.asarray(angle * np.sin(2 * z * angle) - 2 * slope * z * np.sin(angle) ** 2)
 
-    real, imaginary = np.meshgrid(np.linspace(0.05, LARGEST, 79), np.linspace(0, 2, 21))
+    real, imaginary = np.meshgrid(np.linspace(0.05, MAX_EXPONENT, 79), np.linspace(0, 2, 21))
     z = (real + 1j * imaginary).ravel()
     with np.errstate(all="ignore"):
         for _ in range(60):  # Newton from every start at once
             z = z - f(z) / slope_of(z)
-        found = z[np.isfinite(z) & (np.abs(f(z)) < 1e-10) & (z.real > 1e-3) & (z.real < LARGEST)]
+        found = z[np.isfinite(z) & (np.abs(f(z)) < 1e-10) & (z.real > 1e-3) & (z.real < MAX_EXPONENT)]
     if not any(clamped):  # a rigid rotation is no singularity; a double root there is met slowly by Newton
         found = found[np.abs(found - 1) > 1e-4]
-    return float(found.real.min()) if len(found) else LARGEST
+    return float(found.real.min()) if len(found) else MAX_EXPONENT
 
 
 def thermal_exponent(conductivity: Any, sides: NDArray[np.float64], angle: float, cooled: tuple[bool, bool]) -> float:
@@ -69,7 +69,7 @@ def thermal_exponent(conductivity: Any, sides: NDArray[np.float64], angle: float
     opening = float(np.arctan2(first[0] * second[1] - first[1] * second[0], first @ second)) % (2 * np.pi)
     # the same turn as in the body, which may pass pi
     opening = opening if (opening > np.pi) == (angle > np.pi) or abs(opening - np.pi) < 1e-9 else 2 * np.pi - opening
-    return float(min(LARGEST, np.pi / opening if cooled[0] == cooled[1] else np.pi / (2 * opening)))
+    return float(min(MAX_EXPONENT, np.pi / opening if cooled[0] == cooled[1] else np.pi / (2 * opening)))
 
 
 def leading_lame(scene: FullScene) -> tuple[float, float]:

@@ -36,7 +36,7 @@ from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 from warmslip.verification.assumptions.findings import Finding, verdict
 
-NEAR = 12  # facets looked at for a contact point, nearest centroids first
+NEAREST_FACETS = 12  # facets looked at for a contact point, nearest centroids first
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def _interpolation(d: Discretisation, nodes: Array) -> Array:
     """P1 values at the contact points from those at `nodes`, mesh numbers: (points, nodes); other nodes are held."""
     x, points = np.asarray(d.mesh.nodes), np.asarray(d.surface.positions)
     facets = np.asarray(d.mesh.parts[d.full.contact.part])
-    near = min(NEAR, len(facets))
+    near = min(NEAREST_FACETS, len(facets))
     _, candidates = cKDTree(x[facets].mean(axis=1)).query(points, k=near)
     candidates = candidates.reshape(len(points), near)
     corners = x[facets[candidates]]  # (points, near, d, d)

@@ -29,7 +29,7 @@ from warmslip.verification.mms.symbolic import ExactFields
 COUPLINGS = ("staggered", "lagged", "monolithic")
 ROUND_OFF = 1e-11  # of scale, after a few steps
 STUCK = 1e-12  # slip velocity of a sticking point over the largest velocity
-NEAR = 2.0  # mesh sizes within which a status may differ from the exact one
+STATUS_WIDTH = 2.0  # mesh sizes within which a status may differ from the exact one
 
 DOUBLED, FINER = ((8, 8), (16, 16), (32, 32)), ((16, 16), (32, 32), (64, 64))
 FINER_IN_SPACE = ((16, 3), (32, 3), (64, 3))
@@ -121,7 +121,7 @@ def status(name: str, n: int) -> Check:
         "the point of change is where it should be",
         "manufactured",
         worst,
-        NEAR,
+        STATUS_WIDTH,
     )
 
 
