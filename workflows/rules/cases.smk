@@ -19,6 +19,7 @@ def digest(*folders: str) -> str:
 
 
 MEASURING = digest("studies", "paper", "verification", "cli")
+STUDYING = digest("studies")
 FIGURES = digest("figures")
 
 # grid of every case: full, or diagonal (h = k)

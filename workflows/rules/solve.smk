@@ -18,6 +18,7 @@ rule study:
         levels=numbers(config["levels"]),
         reference=config["reference"],
         core=FINGERPRINT,
+        code=STUDYING,
     message:
         "study {wildcards.case}: {params.grid} grid, reference 1/{params.reference}"
     shell:
@@ -93,6 +94,7 @@ rule extremes:
         n=config["extremes"]["n"],
         steps=config["extremes"]["steps"],
         core=FINGERPRINT,
+        code=STUDYING,
     message:
         "runs at the extremes"
     shell:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +41,8 @@ class Checkpoint:
 
     def write(self, folder: Path) -> None:
         """Writes the newest checkpoint of a folder; the newest so far becomes the previous one. Raises OSError."""
-        record = asdict(self) | {"time": self.time.hex()}
-        del record["arrays"]
+        record = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "arrays"}  # not copied
+        record |= {"time": self.time.hex(), "statistics": asdict(self.statistics)}
         newest, previous = (folder / name for name in NAMES)
         written = folder / "checkpoint.part.npz"
         try:
