@@ -9,9 +9,9 @@ import pytest
 from support.bodies import column, completed
 
 import warmslip
+from warmslip.scene.contact_tables import FrictionTable
 from warmslip.scene.reader import build, load
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import FrictionTable
 
 
 @pytest.mark.parametrize(

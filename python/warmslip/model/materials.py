@@ -11,10 +11,11 @@ from warmslip._core import ContactLaw, ContactPart, Diagonal, Friction, NormalCo
 from warmslip.mesh import files
 from warmslip.mesh.refinement import refined
 from warmslip.model.contact_laws import CheckedLaw
+from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Expression
+from warmslip.scene.material_tables import IsotropicTable, RegionTable
 from warmslip.scene.mesh_table import MeshTable
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import ContactTable, IsotropicTable, RegionTable
 from warmslip.scene.validation import coupling_tables
 from warmslip.typing import Array
 

@@ -12,7 +12,7 @@ from warmslip.model.discretisation import Discretisation
 from warmslip.model.linear_pieces import POINTS, exact
 from warmslip.model.uniqueness import ContactPoints, bound, shares_friction
 from warmslip.scene import plausibility
-from warmslip.scene.tables import ContactTable
+from warmslip.scene.contact_tables import ContactTable
 from warmslip.typing import Array
 
 

@@ -9,21 +9,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from warmslip.scene.contact_tables import ContactTable, ExchangeTable, FrictionTable
 from warmslip.scene.errors import SceneError, validated
+from warmslip.scene.material_tables import ExpansionTable, HeatingTable, HeatTable, InertiaTable, IsotropicTable
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import (
-    ContactTable,
-    ExchangeTable,
-    ExpansionTable,
-    FrictionTable,
-    HeatingTable,
-    HeatTable,
-    InertiaTable,
-    InitialTable,
-    IsotropicTable,
-    LoadsTable,
-    SupportsTable,
-)
+from warmslip.scene.tables import InitialTable, LoadsTable, SupportsTable
 from warmslip.scene.types import Finite, Matrix, NonNegative, Vector
 
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from warmslip.scene import plausible_data
+from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import constant
+from warmslip.scene.material_tables import ExpansionTable, HeatingTable
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import ContactTable, ExpansionTable, HeatingTable
 from warmslip.scene.validation import contact_keys, coupling_tables
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from warmslip.scene.expressions import constant
+from warmslip.scene.material_tables import IsotropicTable
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import IsotropicTable
 from warmslip.scene.validation import contact_keys, coupling_tables
 
 FRICTION = 2.0

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Expression
-from warmslip.scene.tables import (
-    ContactTable,
+from warmslip.scene.material_tables import (
     ExpansionTable,
     HeatingTable,
     HeatTable,
     IsotropicTable,
     RegionHeatTable,
     RegionTable,
-    SceneTables,
 )
+from warmslip.scene.tables import SceneTables
 
 SHORTEST = 1e-150  # step, time: its inverse is squared on the way
 

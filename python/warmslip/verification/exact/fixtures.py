@@ -11,7 +11,7 @@ from warmslip.model.discretisation import discretise
 from warmslip.model.loads import Loads
 from warmslip.model.materials import mandel
 from warmslip.scene.full import FullScene, build_full
-from warmslip.scene.tables import IsotropicTable
+from warmslip.scene.material_tables import IsotropicTable
 from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.grading.meshes import Triangulation
