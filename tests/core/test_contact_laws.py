@@ -12,6 +12,7 @@ import warmslip
 from warmslip.scene.contact_tables import FrictionTable
 from warmslip.scene.reader import build, load
 from warmslip.scene.scene import Scene
+from warmslip.simulation.simulation import Simulation
 
 
 @pytest.mark.parametrize(
@@ -186,7 +187,16 @@ def on_a_hole(d: int, friction: dict[str, float], **more: Any) -> Scene:
 @pytest.mark.parametrize("d", [2, 3])
 def test_hardly_any_friction_on_an_oblique_part(d: int, mu: float, stiffness: float | str) -> None:
     """A friction bound far below the normal force is known to the rounding of that force."""
-    found = completed(on_a_hole(d, {"coefficient": mu}, **{"contact.stiffness": stiffness}))
+    scene = on_a_hole(d, {"coefficient": mu}, **{"contact.stiffness": stiffness})
+    found = completed(scene)
+    simulation = Simulation(scene)
+    for state, _ in simulation.steps():
+        slips, normals = state.contact["status"] == 2, np.asarray(simulation.discretisation.surface.normals)
+        force = np.reshape(simulation.stepper.contact_force, (-1, d))
+        pressing = np.sum(force * normals, axis=1)
+        rubbing = np.linalg.norm(force - pressing[:, None] * normals, axis=1)
+        assert slips.any()
+        assert np.abs(rubbing - mu * pressing)[slips].max() <= 1e-14 * np.abs(force).max()
     smooth = completed(on_a_hole(d, {"coefficient": 0.0}, **{"contact.stiffness": stiffness}))
     scale = np.abs(smooth.u).max()
     assert np.abs(found.u - smooth.u).max() <= (10 * mu + 1e-12) * scale
