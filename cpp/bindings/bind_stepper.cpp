@@ -27,7 +27,7 @@ void bind(py::module_& m) {
 
   using Maybe = std::optional<Vec>;
   using S = Stepper<d>;
-  py::class_<S, std::shared_ptr<S>>(m, name<d>("Stepper").c_str(), "Backward Euler with a fixed step (collective).")
+  py::class_<S, std::shared_ptr<S>>(m, name<d>("Stepper").c_str(), "Backward Euler (collective).")
       .def(py::init([](const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                        const ContactSurface<d>& surface, double k, Coupling coupling, Backend backend,
                        const ContactOptions& contact) {
@@ -37,6 +37,16 @@ void bind(py::module_& m) {
            py::arg("layout"), py::arg("problem"), py::arg("operators"), py::arg("surface"), py::kw_only(), py::arg("k"),
            py::arg("coupling"), py::arg("backend"), py::arg("contact"), py::keep_alive<1, 2>(), py::keep_alive<1, 3>(),
            py::keep_alive<1, 4>(), py::keep_alive<1, 5>())
+      .def(py::init([](const Problem<d>& problem, const S& like) { return std::make_shared<S>(problem, like); }),
+           py::arg("problem"), py::kw_only(), py::arg("like"), py::keep_alive<1, 2>(), py::keep_alive<1, 3>(),
+           "For a problem that differs in loads, contact laws and initial data alone; shares the factors of `like`.")
+      .def("set_step", &S::set_step, py::arg("k"),
+           "The size of the next steps, time; factors that are kept are used again (collective).")
+      .def_property_readonly("step", &S::step, "Size of the next steps, time.")
+      .def("has_factored", &S::has_factored, py::arg("k"), "Whether factors for a step size are kept.")
+      .def_property_readonly("refactoring_price", &S::refactoring_price,
+                             "About how many steps the factorization for another step size costs.")
+      .def("revert", &S::revert, "Takes the last step back, once for each step.")
       .def(
           "start",
           [](S& s, const Maybe& u, const Maybe& w, const Maybe& theta, const Eigen::VectorXd& gap, double time) {
@@ -46,7 +56,8 @@ void bind(py::module_& m) {
           "Sets the state; None for a field the problem does not have.")
       .def(
           "resume",
-          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 13>& given) {
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 13>& given,
+             int taken) {
             std::vector<Status> statuses;
             for (const int one : status) statuses.push_back(static_cast<Status>(one));
             FieldExtents extents;
@@ -54,11 +65,12 @@ void bind(py::module_& m) {
             for (Extent* field : extents.all())
               for (double Extent::*part : extent_parts) field->*part = *value++;
             extents.force = *value;
-            s.resume(force, statuses, extents);
+            s.resume(force, statuses, extents, taken);
           },
-          py::arg("contact_force"), py::arg("status"), py::arg("extents"),
-          "After `start`: the contact points of the step before and the extents so far, for the same next step to the "
-          "last bit.")
+          py::arg("contact_force"), py::arg("status"), py::arg("extents"), py::arg("taken"),
+          "After `start`: the contact points of the step before, the extents so far and the number of steps, for the "
+          "same "
+          "next step to the last bit.")
       .def_property_readonly(
           "extents",
           [](const S& s) {
@@ -79,13 +91,14 @@ void bind(py::module_& m) {
       .def(
           "advance",
           [](S& s, const Maybe& force, const Maybe& heat, const Eigen::VectorXd& gap, const Maybe& velocity,
-             const Maybe& temperature, const Eigen::VectorXd& foundation, bool measured) {
+             const Maybe& temperature, const Eigen::VectorXd& foundation, bool measured, double time) {
             return s.advance({force.value_or(nullptr), heat.value_or(nullptr), gap, velocity.value_or(nullptr),
-                              temperature.value_or(nullptr), foundation, measured});
+                              temperature.value_or(nullptr), foundation, measured, time});
           },
           py::arg("force"), py::arg("heat"), py::arg("gap"), py::arg("support_velocity") = py::none(),
           py::arg("support_temperature") = py::none(), py::arg("foundation") = Eigen::VectorXd(),
-          py::arg("measured") = false, "One step; the state stays when the outcome is not completed. See StepLoads.")
+          py::arg("measured") = false, py::arg("time") = std::numeric_limits<double>::quiet_NaN(),
+          "One step; the state stays when the outcome is not completed. See StepLoads.")
       .def_property_readonly(
           "u", [](const S& s) { return share(s.level().u); },
           "Displacement. The vectors change owner at every step: ask again.")

@@ -1180,11 +1180,17 @@ class StepReport2:
         """
 class Stepper2:
     """
-    Backward Euler with a fixed step (collective).
+    Backward Euler (collective).
     """
+    @typing.overload
     def __init__(self, layout: Layout2, problem: Problem2, operators: Operators2, surface: ContactSurface2, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport2:
+    @typing.overload
+    def __init__(self, problem: Problem2, *, like: Stepper2) -> None:
+        """
+        For a problem that differs in loads, contact laws and initial data alone; shares the factors of `like`.
+        """
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport2:
         """
         One step; the state stays when the outcome is not completed. See StepLoads.
         """
@@ -1192,13 +1198,35 @@ class Stepper2:
         """
         After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
         """
+    def has_factored(self, k: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        Whether factors for a step size are kept.
+        """
+    def revert(self) -> None:
+        """
+        Takes the last step back, once for each step.
+        """
+    def set_step(self, k: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The size of the next steps, time; factors that are kept are used again (collective).
+        """
+    @property
+    def refactoring_price(self) -> float:
+        """
+        About how many steps the factorization for another step size costs.
+        """
+    @property
+    def step(self) -> float:
+        """
+        Size of the next steps, time.
+        """
     def clear_cache(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        After `start`: the contact points of the step before and the extents so far, for the same next step to the last bit.
+        After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -1363,11 +1391,17 @@ class StepReport3:
         """
 class Stepper3:
     """
-    Backward Euler with a fixed step (collective).
+    Backward Euler (collective).
     """
+    @typing.overload
     def __init__(self, layout: Layout3, problem: Problem3, operators: Operators3, surface: ContactSurface3, *, k: typing.SupportsFloat | typing.SupportsIndex, coupling: Coupling, backend: Backend, contact: ContactOptions) -> None:
         ...
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False) -> StepReport3:
+    @typing.overload
+    def __init__(self, problem: Problem3, *, like: Stepper3) -> None:
+        """
+        For a problem that differs in loads, contact laws and initial data alone; shares the factors of `like`.
+        """
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport3:
         """
         One step; the state stays when the outcome is not completed. See StepLoads.
         """
@@ -1375,13 +1409,35 @@ class Stepper3:
         """
         After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of those.
         """
+    def has_factored(self, k: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        Whether factors for a step size are kept.
+        """
+    def revert(self) -> None:
+        """
+        Takes the last step back, once for each step.
+        """
+    def set_step(self, k: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The size of the next steps, time; factors that are kept are used again (collective).
+        """
+    @property
+    def refactoring_price(self) -> float:
+        """
+        About how many steps the factorization for another step size costs.
+        """
+    @property
+    def step(self) -> float:
+        """
+        Size of the next steps, time.
+        """
     def clear_cache(self) -> None:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"]) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        After `start`: the contact points of the step before and the extents so far, for the same next step to the last bit.
+        After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
     def start(self, u: petsc4py.PETSc.Vec | None, w: petsc4py.PETSc.Vec | None, theta: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], time: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """

@@ -57,7 +57,7 @@ def step_to(simulation: Simulation) -> None:
     assert max(simulation.statistics.residuals.values()) <= 1e-11
 
 
-def test_reference_run(benchmark: Benchmark, warn: Callable[..., None]) -> None:
+def test_reference_run(benchmark: Benchmark, say: Callable[..., None]) -> None:
     """h = k = 1/n, n = 256 unless WARMSLIP_BENCH_N says otherwise: a step against one substitution with both factors."""
     n = int(os.environ.get("WARMSLIP_BENCH_N", "256"))
     pairs: list[float] = []
@@ -86,7 +86,7 @@ def test_reference_run(benchmark: Benchmark, warn: Callable[..., None]) -> None:
     simulation = benchmark.pedantic(reference, rounds=1, iterations=1)
     cost = simulation.stepper.cost
     substitution = statistics.median(pairs)
-    warn(
+    say(
         unknowns=simulation.discretisation.unknowns,
         milliseconds_a_step=1e3 * cost.step_seconds / cost.steps,
         milliseconds_a_substitution=1e3 * substitution,
@@ -105,7 +105,7 @@ def test_reference_run(benchmark: Benchmark, warn: Callable[..., None]) -> None:
         pytest.skip(f"no stored norms for n = {n}: {tuple(norms(simulation).values())}")
 
 
-def test_step_against_scipy(benchmark: Benchmark, warn: Callable[..., None]) -> None:
+def test_step_against_scipy(benchmark: Benchmark, say: Callable[..., None]) -> None:
     """The time loops of this core and of the SciPy scheme at h = 1/128, interleaved; the same answer.
 
     SciPy's loop is written twice: plainly (factored once, two solves a step with K), and with K^-1 P stored as a dense
@@ -131,7 +131,7 @@ def test_step_against_scipy(benchmark: Benchmark, warn: Callable[..., None]) -> 
     def faster(than: str) -> float:
         return statistics.median(b / a for a, b in zip(seconds["ours"], seconds[than], strict=True))
 
-    warn(
+    say(
         milliseconds_a_step=1e3 * statistics.median(seconds["ours"]) / steps,
         milliseconds_a_step_with_SciPy=1e3 * statistics.median(seconds["plain"]) / steps,
         milliseconds_a_step_with_SciPy_and_a_stored_matrix=1e3 * statistics.median(seconds["stored"]) / steps,
@@ -146,7 +146,7 @@ def test_step_against_scipy(benchmark: Benchmark, warn: Callable[..., None]) -> 
     [({}, {"contact__quadrature": "gauss-2"}), ({}, {"time__coupling": "monolithic"})],
     ids=["nodal, gauss-2", "staggered, monolithic"],
 )
-def test_choices(benchmark: Benchmark, warn: Callable[..., None], base: dict[str, Any], other: dict[str, Any]) -> None:
+def test_choices(benchmark: Benchmark, say: Callable[..., None], base: dict[str, Any], other: dict[str, Any]) -> None:
     """What a choice costs a step at h = k = 1/64."""
     seconds: tuple[list[float], list[float]] = ([], [])
 
@@ -163,4 +163,4 @@ def test_choices(benchmark: Benchmark, warn: Callable[..., None], base: dict[str
     assert np.abs(near - 1).max() < 0.05  # another scheme, the same problem
     assert (near != 1).any()
     first, second = (statistics.median(times) for times in seconds)
-    warn(milliseconds_a_step=1e3 * first, milliseconds_a_step_of_the_other=1e3 * second, ratio=second / first)
+    say(milliseconds_a_step=1e3 * first, milliseconds_a_step_of_the_other=1e3 * second, ratio=second / first)

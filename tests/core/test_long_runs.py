@@ -12,7 +12,7 @@ from support.boxes import along, completed, elasticity, field, fields, misses, s
 
 from warmslip import Scene, _core
 from warmslip.model.foresight import gradients
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.simulation.simulation import Simulation
 
 pytestmark = pytest.mark.parametrize("d", [2, 3])

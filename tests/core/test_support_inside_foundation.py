@@ -14,7 +14,7 @@ from support.ranked import Checks
 
 import warmslip
 from warmslip import _core, discretise
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.simulation.simulation import Simulation
 
 check = Checks()

@@ -147,7 +147,7 @@ void check_steps(const PaperProblem<d>& paper, Coupling coupling, bool refine) {
   const auto before = [&](int steps) {
     paper.start(stepper);
     stepper.resume(Eigen::VectorXd::Zero(stepper.contact_force().size()),
-                   std::vector<Status>(stepper.status().size(), Status::open), {});
+                   std::vector<Status>(stepper.status().size(), Status::open), {}, 0);
     for (int n = 0; n < steps; ++n) advance();
   };
   for (const int steps : {0, 1, 2}) {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warmslip import Scene, _core, discretise
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.scene.mesh_table import PARTS
 from warmslip.scene.reader import build
 from warmslip.simulation import summary

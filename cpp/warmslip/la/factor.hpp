@@ -32,6 +32,7 @@ class Factor {
   virtual const Eigen::MatrixXd& compliance() = 0;
   /// Bytes of the factor on this rank, and what it is ("cholmod simplicial LDL^T, METIS").
   virtual double bytes() const = 0;
+  virtual double flops() const { return 0; }  ///< floating point operations of the factorization, 0 where not counted
   virtual std::string description() const = 0;
 
   /// x = K^-1 r.

@@ -132,6 +132,7 @@ class CholmodFactor final : public Factor {
   }
 
   double bytes() const override { return panels_.bytes(); }
+  double flops() const override { return common_.fl; }
   std::string description() const override {
     return std::string("CHOLMOD L D L^T, ") + (metis_ ? "METIS" : "AMD") + " ordering, contact unknowns last";
   }

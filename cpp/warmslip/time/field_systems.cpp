@@ -48,14 +48,14 @@ void Stepper<d>::fix(Vec v, const std::vector<PetscInt>& indices, Vec given, dou
 // f + rho M w_{n-1} / k - A u_{n-1} + G theta_{n-1}, less what moving supports pull
 template <int d>
 void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::VectorXd& from) {
-  const double k = options_.k;
+  const double k = systems_->k;
   const Vec out = momentum_right_;
   WARMSLIP_PETSC(VecCopy(loads.force, out));
-  if (now_.momentum && rigid_.empty()) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
-  if (now_.momentum && !rigid_.empty()) {
+  if (now_.momentum && systems_->rigid.empty()) WARMSLIP_PETSC(VecAXPY(out, 1 / k, now_.momentum));
+  if (now_.momentum && !systems_->rigid.empty()) {
     const Vec seen = next_.strained_w;
     WARMSLIP_PETSC(VecCopy(now_.strained_w, seen));
-    rigid_.carry(now_.rigid - from, seen);
+    systems_->rigid.carry(now_.rigid - from, seen);
     multiply(operators_.inertia, seen, correction_w_);
     WARMSLIP_PETSC(VecAXPY(out, 1 / k, correction_w_));
   }
@@ -77,11 +77,11 @@ template <int d>
 void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double scale) {
   const Vec out = heat_right_;
   WARMSLIP_PETSC(VecCopy(loads.heat, out));
-  WARMSLIP_PETSC(VecAXPY(out, 1 / options_.k, now_.mass_theta));
+  WARMSLIP_PETSC(VecAXPY(out, 1 / systems_->k, now_.mass_theta));
   if (heating_w) WARMSLIP_PETSC(VecAXPY(out, 1, heating_w));
   const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_theta_, out); };
   if (loads.support_temperature) {
-    less(operators_.mass, 1 / options_.k, loads.support_temperature);
+    less(operators_.mass, 1 / systems_->k, loads.support_temperature);
     less(operators_.conductivity, 1, loads.support_temperature);
     less(operators_.exchange, 1, loads.support_temperature);
   }
@@ -93,9 +93,9 @@ void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double s
 // that are solved for apart; `external` is the part of it that acts on those.
 template <int d>
 Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
-  const Eigen::VectorXd nodal = momentum_->reduce(right);
-  if (!rigid_.empty()) rigid_load_ = rigid_.load(external, right);
-  return contact_ ? surface_.at_points(nodal) : Eigen::VectorXd();
+  const Eigen::VectorXd nodal = systems_->momentum->reduce(right);
+  if (!systems_->rigid.empty()) rigid_load_ = systems_->rigid.load(external, right);
+  return systems_->contact ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
 // Gives the contact nodes that are also points the velocity of their law, in w; `moved` has the same change. Rounding
@@ -113,7 +113,7 @@ void Stepper<d>::apply_contact_velocity(const ContactSolution<d>& contact, Vec w
     const auto point = static_cast<std::size_t>(i);
     const Point<d> velocity = nodal.segment<d>(node * d);
     change.segment<d>(node * d) =
-        settled<d>(posed_.law(point), posed_.points[point], options_.k, contact.status[point],
+        settled<d>(posed_.law(point), posed_.points[point], systems_->k, contact.status[point],
                    contact.force.template segment<d>(i * d), posed_.free.template segment<d>(i * d), velocity) -
         velocity;
   }
@@ -127,11 +127,11 @@ void Stepper<d>::apply_contact_velocity(const ContactSolution<d>& contact, Vec w
 template <int d>
 Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec theta) {
   const Vec out = monolithic() ? Vec(coupled_) : w;
-  momentum_->expand(contact_ ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), out);
+  systems_->momentum->expand(systems_->contact ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), out);
   Eigen::VectorXd motions;
-  if (!rigid_.empty()) {
-    motions = contact_ ? contact.rigid : rigid_.alone(rigid_load_);
-    rigid_.strain(motions, out);
+  if (!systems_->rigid.empty()) {
+    motions = systems_->contact ? contact.rigid : systems_->rigid.alone(rigid_load_);
+    systems_->rigid.strain(motions, out);
   }
   if (monolithic()) split(coupled_, w, theta);
   return motions;
@@ -140,7 +140,7 @@ Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec
 template <int d>
 bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution) {
   const Timed timed(cost_.contact_seconds);
-  solution = contact_->solve(posed_, guess);
+  solution = systems_->contact->solve(posed_, guess);
   if (solution.converged && surface_.shares())
     minimal_forces(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
   // every rank solved the same small problem; let them agree to the last bit
@@ -171,14 +171,14 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     if (!reach_motion(loads, from, contact)) return false;
   }
   const Timed part(cost_.momentum_seconds);
-  if (rigid_.empty()) {
+  if (systems_->rigid.empty()) {
     expand(contact, next_.w, next_.theta);
   } else {
     next_.rigid = from + expand(contact, next_.strained_w, next_.theta);
     WARMSLIP_PETSC(VecCopy(next_.strained_w, next_.w));
-    rigid_.carry(next_.rigid, next_.w);
+    systems_->rigid.carry(next_.rigid, next_.w);
   }
-  if (contact_) apply_contact_velocity(contact, next_.w, next_.strained_w);
+  if (systems_->contact) apply_contact_velocity(contact, next_.w, next_.strained_w);
   return true;
 }
 
@@ -189,15 +189,15 @@ bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& fro
     const Timed part(cost_.momentum_seconds);
     momentum_right_side(loads, from);
     if (monolithic()) {
-      heat_right_side(loads, nullptr, coupled_scale_);
+      heat_right_side(loads, nullptr, systems_->coupled_scale);
       join(momentum_right_, heat_right_, coupled_right_);
     }
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
-    if (contact_ && !rigid_.empty()) free_ += carried_ * from;
+    if (systems_->contact && !systems_->rigid.empty()) free_ += systems_->carried * from;
   }
-  if (!contact_) return true;
+  if (!systems_->contact) return true;
   if (!in_range(free_)) return false;
-  posed_ = contact_problem(problem_, surface_, options_.k, now_.contact_u, loads.gap, free_, rigid_load_);
+  posed_ = contact_problem(problem_, surface_, systems_->k, now_.contact_u, loads.gap, free_, rigid_load_);
   return solve_contact(contact_force_, contact);
 }
 
@@ -237,37 +237,37 @@ void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
 template <int d>
 void Stepper<d>::solve_heat(Vec right, Vec external, const Eigen::VectorXd& given, const Eigen::VectorXd& beside,
                             Vec out) {
-  const Eigen::VectorXd free = heat_->reduce(right);
-  const Eigen::Index m = constants_.count();
-  const Eigen::VectorXd load = m > 0 ? constants_.load(external, right) : Eigen::VectorXd();
+  const Eigen::VectorXd free = systems_->heat->reduce(right);
+  const Eigen::Index m = systems_->constants.count();
+  const Eigen::VectorXd load = m > 0 ? systems_->constants.load(external, right) : Eigen::VectorXd();
   if (!reactive()) {
-    heat_->expand(Eigen::VectorXd::Zero(free.size()), out);
+    systems_->heat->expand(Eigen::VectorXd::Zero(free.size()), out);
     if (m > 0) {
-      const Eigen::VectorXd constants = constants_.alone(load);
-      constants_.strain(constants, out);
-      constants_.carry(constants, out);
+      const Eigen::VectorXd constants = systems_->constants.alone(load);
+      systems_->constants.strain(constants, out);
+      systems_->constants.carry(constants, out);
     }
     return;
   }
   const Eigen::Index n = free.size();
-  const Eigen::MatrixXd& compliance = heat_->compliance();
+  const Eigen::MatrixXd& compliance = systems_->heat->compliance();
   Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n + m, n + m);
   Eigen::VectorXd loads(n + m);
   system.topLeftCorner(n, n) += compliance * flow_.lost;
   loads.head(n) = free - beside + compliance * given;
   if (m > 0) {
     Eigen::MatrixXd along(n, m);
-    for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(constants_.along(j));
+    for (Eigen::Index j = 0; j < m; ++j) along.col(j) = surface_.nodal_values(systems_->constants.along(j));
     system.topRightCorner(n, m) = -along;
     system.bottomLeftCorner(m, n) = along.transpose() * flow_.lost;
-    system.bottomRightCorner(m, m) = constants_.inertia();
+    system.bottomRightCorner(m, m) = systems_->constants.inertia();
     loads.tail(m) = load + along.transpose() * given;
   }
   const Eigen::VectorXd found = system.partialPivLu().solve(loads);
-  heat_->expand(flow_.lost * found.head(n) - given, out);
+  systems_->heat->expand(flow_.lost * found.head(n) - given, out);
   if (m > 0) {
-    constants_.strain(found.tail(m), out);
-    constants_.carry(found.tail(m), out);
+    systems_->constants.strain(found.tail(m), out);
+    systems_->constants.carry(found.tail(m), out);
   }
 }
 
@@ -276,7 +276,7 @@ void Stepper<d>::join(Vec momentum, Vec heat, Vec coupled) const {
   Values m(momentum), h(heat), c(coupled);
   for (PetscInt i = 0; i < layout_.owned(); ++i) {
     (*c).template segment<d>(i * (d + 1)) = (*m).template segment<d>(i * d);
-    (*c)[i * (d + 1) + d] = coupled_scale_ * (*h)[i];
+    (*c)[i * (d + 1) + d] = systems_->coupled_scale * (*h)[i];
   }
 }
 

@@ -50,12 +50,12 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
   ContactSolution<d> change, again;
   correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
-  if (contact_) {
+  if (systems_->contact) {
     const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
     posed_.known_force = contact.force;
     posed_.known_velocity = apply ? velocity + correction : velocity;
     posed_.rigid = rigid_load_;
-    posed_.free = posed_.known_velocity + contact_->compliance() * contact.force;
+    posed_.free = posed_.known_velocity + systems_->contact->compliance() * contact.force;
     again = contact;
     if (!(apply ? solve_contact(contact.force, again) : respond(correction + creep(contact), again))) return false;
     if (apply) free_ = posed_.free;
@@ -65,37 +65,37 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     again.stage = std::max(again.stage, contact.stage);
   }
   const Eigen::VectorXd motions =
-      expand(change, rigid_.empty() ? correction_w_ : correction_strained_, correction_theta_);
-  if (!rigid_.empty()) {
+      expand(change, systems_->rigid.empty() ? correction_w_ : correction_strained_, correction_theta_);
+  if (!systems_->rigid.empty()) {
     WARMSLIP_PETSC(VecCopy(correction_strained_, correction_w_));
-    rigid_.carry(motions, correction_w_);
+    systems_->rigid.carry(motions, correction_w_);
   }
   if (monolithic) {
     note_temperature(balances);
     if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
   }
-  if (contact_) {
+  if (systems_->contact) {
     const Vec moved = momentum_right_;
     WARMSLIP_PETSC(VecWAXPY(moved, 1, correction_w_, next_.w));
     apply_contact_velocity(again, moved, correction_strained_);
     WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
   }
-  note(errors_.u, extents_.u, options_.k * largest_entry(correction_w_),
+  note(errors_.u, extents_.u, systems_->k * largest_entry(correction_w_),
        std::max(largest_entry(next_.u), largest_entry(now_.u)), balances.displacement_scale);
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
-    WARMSLIP_PETSC(VecScale(change_u, options_.k));
+    WARMSLIP_PETSC(VecScale(change_u, systems_->k));
     const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
     note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
          1e-8 * there.possible);
     extents_.force = std::max(extents_.force, balances.force_scale);
     if (next_.elastic_u && extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
       multiply(operators_.elasticity, change_w, momentum_right_);
-      errors_.stress = std::min(errors_.stress, options_.k * largest_entry(momentum_right_) / extents_.force);
+      errors_.stress = std::min(errors_.stress, systems_->k * largest_entry(momentum_right_) / extents_.force);
     }
   }
-  if (contact_) {
+  if (systems_->contact) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
          largest_entry(surface_.to_nodes(contact.force)), balances.contact_scale);
     correction_force_ = change.force;
@@ -103,9 +103,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
   }
   if (apply) {
-    if (contact_) contact = std::move(again);
+    if (systems_->contact) contact = std::move(again);
     WARMSLIP_PETSC(VecAXPY(next_.w, 1, correction_w_));
-    if (!rigid_.empty()) {
+    if (!systems_->rigid.empty()) {
       WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
       next_.rigid += motions;
     }
@@ -155,7 +155,7 @@ void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
 // The response of the contact; every rank found it, and they agree whether there is one.
 template <int d>
 bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact) {
-  int found = contact_->respond(posed_, correction, contact);
+  int found = systems_->contact->respond(posed_, correction, contact);
   MPI_Bcast(&found, 1, MPI_INT, 0, layout_.comm());
   return found != 0;
 }
@@ -218,14 +218,14 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   const auto done = [&](double rest, double error) { return rest <= enough && !std::isgreater(error, 1e-9); };
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
-  const bool creeps = contact_ && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
+  const bool creeps = systems_->contact && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
   if (creeps && correct_motion(loads, balances, contact, true)) {
     balances = balance(complete(loads, contact));
     ++cost_.refinements;
     errors_ = {};
     for (Extent* field : extents_.all()) field->tried = 0;
   }
-  for (int pass = 0; momentum_ && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
+  for (int pass = 0; systems_->momentum && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
     const double rest = motion(), error = errors_.largest();
     const Motion before = motion_of(contact);
     const bool was_closed = closed(balances);
@@ -240,7 +240,7 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
     }
     if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;
   }
-  for (int pass = 0; heat_ && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
+  for (int pass = 0; systems_->heat && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
     const double rest = warmth();
     correct_heat(inputs(loads, contact), balances, true);
     products(next_);
@@ -254,12 +254,12 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   const bool wanted = measured_now(loads, contact);
   if (!wanted && !refined && !warmed) return balances;
   const int before = substitutions();
-  const bool moved = momentum_ && (refined || wanted);
+  const bool moved = systems_->momentum && (refined || wanted);
   evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
   if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, false);
   if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
-  if (heat_ && (warmed || wanted)) correct_heat(inputs(loads, contact), balances, false);
-  if (heat_ && moved && !undetermined_) add_heat_of_error(loads);
+  if (systems_->heat && (warmed || wanted)) correct_heat(inputs(loads, contact), balances, false);
+  if (systems_->heat && moved && !undetermined_) add_heat_of_error(loads);
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return balances;
@@ -270,7 +270,7 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
 template <int d>
 bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
   if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
-  for (double step = 1, n = std::round(time_ / options_.k) + 1; step <= n; step *= options_.measured_steps)
+  for (double step = 1, n = taken_ + 1; step <= n; step *= options_.measured_steps)
     if (step == n) return true;
   return false;
 }

@@ -29,6 +29,104 @@ StepReport<d> not_taken(Outcome outcome, const std::string& reason) {
 }  // namespace
 
 template <int d>
+Stepper<d>::Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                    const ContactSurface<d>& surface, StepperOptions options)
+    : layout_(layout),
+      problem_(problem),
+      operators_(operators),
+      surface_(surface),
+      options_(options),
+      evaluator_(layout, problem, operators, surface),
+      cache_(std::make_shared<SystemCache<d>>(layout, options.factor_bytes)) {
+  if (!problem.moves() && !problem.conducts()) throw std::invalid_argument("a problem needs motion or heat");
+  set_step(options.k);
+  take_vectors();
+}
+
+template <int d>
+Stepper<d>::Stepper(const Problem<d>& problem, const Stepper& like)
+    : layout_(like.layout_),
+      problem_(problem),
+      operators_(like.operators_),
+      surface_(like.surface_),
+      options_(like.options_),
+      evaluator_(layout_, problem, operators_, surface_),
+      cache_(like.cache_) {
+  if (problem.contact_heats() != like.problem_.contact_heats())
+    throw std::invalid_argument("a stepper can share its factors where contact heats in both problems or in none");
+  set_step(options_.k);
+  take_vectors();
+  clear_cache();
+}
+
+template <int d>
+void Stepper<d>::set_step(double k) {
+  if (systems_ && systems_->k == k) return;
+  const Timed timed(cost_.setup_seconds);
+  if (auto kept = cache_->find(k)) {
+    systems_ = std::move(kept);
+  } else {
+    try {
+      systems_ = std::make_shared<StepSystems<d>>(layout_, problem_, operators_, surface_, k, options_.coupling,
+                                                  options_.backend, options_.contact);
+    } catch (const SolveFailed& failure) {  // between steps: refused
+      throw std::invalid_argument(failure.what());
+    }
+    cache_->keep(systems_);
+    cost_.factorizations += systems_->factorizations();
+  }
+  if (!systems_->rigid.empty()) evaluator_.rigid_share(systems_->rigid.share());
+  if (!systems_->constants.empty() && !heat_external_) heat_external_ = layout_.vector(1);
+  cost_.factor_bytes = cache_->bytes();
+}
+
+template <int d>
+double Stepper<d>::refactoring_price() const {
+  const double flops = layout_.sum(systems_->flops()), bytes = layout_.sum(systems_->bytes());
+  return flops > 0 && bytes > 0 ? flops / bytes : 20;
+}
+
+template <int d>
+void Stepper<d>::take_vectors() {
+  const bool moves = problem_.moves(), conducts = problem_.conducts();
+  for (TimeLevel* level : {&now_, &next_}) {
+    if (moves) {
+      level->u = layout_.vector(d);
+      level->w = layout_.vector(d);
+    }
+    if (conducts) {
+      level->theta = layout_.vector(1);
+      level->mass_theta = layout_.vector(1);
+    }
+    if (operators_.inertia) level->momentum = layout_.vector(d);
+    if (operators_.elasticity) level->elastic_u = layout_.vector(d);
+    if (!systems_->rigid.empty())
+      for (VecHandle* v : {&level->strained, &level->strained_w}) *v = layout_.vector(d);
+    level->rigid = Eigen::VectorXd::Zero(systems_->rigid.count());
+    if (operators_.expansion && moves) level->expansion_theta = layout_.vector(d);
+    if (operators_.heating && moves) level->heating_w = layout_.vector(1);
+    level->contact_force = Eigen::VectorXd::Zero(surface_.points() * d);
+  }
+  if (moves)
+    for (VecHandle* v : {&momentum_right_, &correction_w_}) *v = layout_.vector(d);
+  if (conducts)
+    for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout_.vector(1);
+  if (!systems_->rigid.empty())
+    for (VecHandle* v : {&momentum_external_, &correction_strained_}) *v = layout_.vector(d);
+  if (!systems_->constants.empty()) heat_external_ = layout_.vector(1);
+  if (moves && conducts && options_.coupling == Coupling::monolithic)
+    for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);
+  if (reactive()) {
+    Eigen::VectorXd held = Eigen::VectorXd::Zero(layout_.mesh().nodes.rows());
+    for (const PetscInt i : operators_.prescribed_temperature) held[i] = 1;
+    held = layout_.sum(std::move(held));
+    for (const PetscInt i : surface_.global_nodes()) fixed_contact_.push_back(held[i] > 0);
+  }
+  contact_force_ = Eigen::VectorXd::Zero(surface_.points() * d);
+  status_.assign(static_cast<std::size_t>(surface_.points()), Status::open);
+}
+
+template <int d>
 void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time) {
   if (gap.size() != surface_.points()) throw std::invalid_argument("the gap needs one value a contact point");
   const auto take = [](Vec from, const VecHandle& to, const char* name) {
@@ -41,20 +139,22 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   take(theta, now_.theta, "theta");
   now_.gap = gap;
   time_ = time;
+  taken_ = static_cast<int>(std::lround(std::min(time / systems_->k, 2e9)));
+  before_.reset();
   extents_ = {};
   clear_cache();
-  if (!rigid_.empty()) {
+  if (!systems_->rigid.empty()) {
     WARMSLIP_PETSC(VecCopy(now_.u, now_.strained));
     WARMSLIP_PETSC(VecCopy(now_.w, now_.strained_w));
-    rigid_.remove(now_.strained);
-    now_.rigid = rigid_.remove(now_.strained_w);
+    systems_->rigid.remove(now_.strained);
+    now_.rigid = systems_->rigid.remove(now_.strained_w);
   }
   take_state();
 }
 
 template <int d>
 void Stepper<d>::part(Vec strained, Vec strained_w, const Eigen::VectorXd& rigid) {
-  if (rigid_.empty()) throw std::invalid_argument("supports leave the body no rigid motion");
+  if (systems_->rigid.empty()) throw std::invalid_argument("supports leave the body no rigid motion");
   if (!strained || !strained_w || rigid.size() != now_.rigid.size())
     throw std::invalid_argument("displacement, velocity and rigid motion are parted together");
   WARMSLIP_PETSC(VecCopy(strained, now_.strained));
@@ -72,24 +172,25 @@ void Stepper<d>::take_state() {
 
 template <int d>
 void Stepper<d>::resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status,
-                        const FieldExtents& extents) {
+                        const FieldExtents& extents, int taken) {
   if (contact_force.size() != contact_force_.size() || status.size() != status_.size())
     throw std::invalid_argument("contact forces and statuses need one entry a contact point");
   contact_force_ = now_.contact_force = contact_force;
   status_ = status;
   extents_ = extents;
+  taken_ = taken;
   clear_cache();
 }
 
 template <int d>
 void Stepper<d>::clear_cache() {
-  if (contact_) contact_->clear_cache();
+  cache_->clear_contact_caches();
 }
 
 // What the balances read of a step beside its two levels.
 template <int d>
 StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& contact) const {
-  return {options_.k,
+  return {systems_->k,
           loads.force,
           loads.heat,
           monolithic() ? next_.expansion_theta : now_.expansion_theta,
@@ -104,13 +205,13 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.
 template <int d>
 StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>& contact) {
-  if (next_.w) WARMSLIP_PETSC(VecWAXPY(next_.u, options_.k, next_.w, now_.u));
-  if (next_.strained) WARMSLIP_PETSC(VecWAXPY(next_.strained, options_.k, next_.strained_w, now_.strained));
+  if (next_.w) WARMSLIP_PETSC(VecWAXPY(next_.u, systems_->k, next_.w, now_.u));
+  if (next_.strained) WARMSLIP_PETSC(VecWAXPY(next_.strained, systems_->k, next_.strained_w, now_.strained));
   next_.gap = loads.gap;
-  if (contact_) next_.contact_force = contact.force;
+  if (systems_->contact) next_.contact_force = contact.force;
   if (next_.heating_w)
     multiply(operators_.heating, next_.straining(), next_.heating_w);  // before the heat that may ask for it
-  if (heat_) solve_heat(loads, options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w);
+  if (systems_->heat) solve_heat(loads, options_.coupling == Coupling::lagged ? now_.heating_w : next_.heating_w);
   products(next_);
   return inputs(loads, contact);
 }
@@ -139,7 +240,8 @@ Outcome Stepper<d>::outcome_of(const Balances& l) const {
 // Whether PETSc's options put an iterative solver in the place of a factorization.
 template <int d>
 bool Stepper<d>::iterative() const {
-  return (momentum_ && layout_.sum(momentum_->bytes()) == 0) || (heat_ && layout_.sum(heat_->bytes()) == 0);
+  return (systems_->momentum && layout_.sum(systems_->momentum->bytes()) == 0) ||
+         (systems_->heat && layout_.sum(systems_->heat->bytes()) == 0);
 }
 
 // The reason for which a step is rejected.
@@ -192,7 +294,7 @@ bool Stepper<d>::in_range(const Eigen::VectorXd& values) const {
 template <int d>
 StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   if (loads.gap.size() != surface_.points()) throw std::invalid_argument("the gap needs one value a contact point");
-  if ((momentum_ && !loads.force) || (now_.theta && !loads.heat))
+  if ((systems_->momentum && !loads.force) || (now_.theta && !loads.heat))
     throw std::invalid_argument("a load vector is missing");
   if (reactive() && loads.foundation.size() != surface_.points())
     throw std::invalid_argument("the foundation's temperature needs one value a contact point");
@@ -201,9 +303,11 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   errors_ = {};
   undetermined_ = false;
   grazing_ = 1;
+  before_.reset();
+  const FieldExtents extents_before = extents_;
   for (Extent* field : extents_.all()) field->tried = 0;
   ContactSolution<d> contact;
-  if (momentum_ && !solve_motion(loads, contact)) {
+  if (systems_->momentum && !solve_motion(loads, contact)) {
     const bool finite = in_range(free_);
     StepReport<d> report = !finite ? not_taken<d>(Outcome::not_finite, beyond_doubles)
                            : contact.unsupported
@@ -217,7 +321,9 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   }
   const StepInputs inputs = complete(loads, contact);
   StepReport<d> report = conclude(loads, refine(loads, balance(inputs), contact), contact);
-  if (report.outcome == Outcome::completed) cost_.substitutions += substitutions() - before;
+  if (report.outcome != Outcome::completed) return report;
+  before_->extents = extents_before;
+  cost_.substitutions += substitutions() - before;
   return report;
 }
 
@@ -244,25 +350,41 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balan
     const Status status = contact.status[static_cast<std::size_t>(i)];
     ++(status == Status::open ? report.open : status == Status::stick ? report.stick : report.slip);
   }
-  if (contact_) {
+  before_ = Before{contact_force_, status_, {}, time_};
+  if (systems_->contact) {
     contact_force_ = std::move(contact.force);
     status_ = std::move(contact.status);
   }
   std::swap(now_, next_);
-  time_ += options_.k;
+  time_ = std::isfinite(loads.time) ? loads.time : time_ + systems_->k;
+  ++taken_;
   ++cost_.steps;
   return report;
 }
 
 template <int d>
+void Stepper<d>::revert() {
+  if (!before_) throw std::invalid_argument("there is no step that could be taken back");
+  std::swap(now_, next_);
+  contact_force_ = std::move(before_->contact_force);
+  status_ = std::move(before_->status);
+  extents_ = before_->extents;
+  time_ = before_->time;
+  before_.reset();
+  --taken_;
+  --cost_.steps;
+  clear_cache();
+}
+
+template <int d>
 int Stepper<d>::substitutions() const {
-  return (momentum_ ? momentum_->substitutions() : 0) + (heat_ ? heat_->substitutions() : 0);
+  return systems_->substitutions();
 }
 
 template <int d>
 std::string Stepper<d>::solver() const {
-  if (!momentum_) return "heat: " + heat_->description();
-  return momentum_->description() + (heat_ ? "; heat: " + heat_->description() : "");
+  if (!systems_->momentum) return "heat: " + systems_->heat->description();
+  return systems_->momentum->description() + (systems_->heat ? "; heat: " + systems_->heat->description() : "");
 }
 
 template class Stepper<2>;

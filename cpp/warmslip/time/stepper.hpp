@@ -1,14 +1,11 @@
 // Backward Euler for problem (PF): one verb, advance().
 #pragma once
-#include "warmslip/contact/solver.hpp"
-#include "warmslip/fem/rigid_motions.hpp"
-#include "warmslip/la/factor.hpp"
+#include <optional>
+
 #include "warmslip/time/balances.hpp"
+#include "warmslip/time/step_systems.hpp"
 
 namespace warmslip {
-
-/// Which time level the coupling terms take: (theta_{n-1}, w_n), (theta_{n-1}, w_{n-1}) or (theta_n, w_n).
-enum class Coupling { staggered, lagged, monolithic };
 
 /// `precision_lost`: the equations are solved to round-off and yet a field has fewer than four digits, see Digits.
 /// `unsupported`: nothing holds the body in a step without inertia. `solver_failed`: a linear solve did not reach its
@@ -24,7 +21,7 @@ enum class Outcome {
 };
 
 struct StepperOptions {
-  double k;  ///< time step
+  double k;  ///< time step, until `set_step` changes it
   Coupling coupling;
   Backend backend = Backend::automatic;
   ContactOptions contact{};
@@ -33,6 +30,7 @@ struct StepperOptions {
   int passes = 6;                 ///< of it at most, while they help
   double balance_bound = 1e-10;   ///< a step whose balances leave more is rejected, see Balances::energy_residual
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
+  double factor_bytes = 1e9;      ///< bound on the factors of step sizes that are kept for another use
   int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on, and in
                                   ///< steps that touch the foundation after one that did not
 };
@@ -70,6 +68,7 @@ struct StepLoads {
   Vec support_velocity = nullptr, support_temperature = nullptr;
   Eigen::VectorXd foundation{};  ///< theta_F (points), where the conductance depends on the pressure
   bool measured = false;         ///< digits are estimated in this step whatever its number
+  double time = std::numeric_limits<double>::quiet_NaN();  ///< at the end of the step; nan: k after the last one
 };
 
 template <int d>
@@ -105,13 +104,26 @@ class Stepper {
   /// Factors the operators of `problem` for the step size of `options`.
   Stepper(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
           const ContactSurface<d>& surface, StepperOptions options);
+  /// A stepper for a problem that differs from that of `like` in loads, contact laws and initial data alone: it has the
+  /// same layout, operators, surface and options, and shares the factors. One of the two may step at a time.
+  Stepper(const Problem<d>& problem, const Stepper& like);
+
+  /// The size of the next steps (collective). Factors that are kept are used again. Throws std::invalid_argument for
+  /// a size that is not positive, or for which an operator cannot be factored; the size stays as it was then.
+  void set_step(double k);
+  double step() const { return systems_->k; }
+  /// Whether factors for a step size are kept.
+  bool has_factored(double k) const { return cache_->find(k) != nullptr; }
+  /// About how many steps the factorization for another step size costs, from the counts of their operations.
+  double refactoring_price() const;
 
   /// Sets the initial data (2.11); `gap` at the contact points. Fields the problem does not have are null. A run that
   /// goes on passes the contact forces and statuses of its last step and the extents so far as well, and for a body
   /// without supports how its motion was parted: the next step is then the same to the last bit as that of a stepper
   /// that called `clear_cache` there.
   void start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, double time = 0);
-  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldExtents& extents);
+  void resume(const Eigen::VectorXd& contact_force, const std::vector<Status>& status, const FieldExtents& extents,
+              int taken);
   /// After `start`: displacement and velocity of a body without supports but for rigid motions, and the velocities of
   /// those.
   void part(Vec strained, Vec strained_w, const Eigen::VectorXd& rigid);
@@ -119,6 +131,8 @@ class Stepper {
   void clear_cache();
   /// One step. When the outcome is not `completed`, the state is the last good one.
   StepReport<d> advance(const StepLoads& loads);
+  /// Takes the last step back, which was completed; once for each step.
+  void revert();
 
   const TimeLevel& level() const { return now_; }
   double time() const { return time_; }
@@ -126,11 +140,13 @@ class Stepper {
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
   const FieldExtents& extents() const { return extents_; }
-  const ContactSolver<d>* contact_solver() const { return contact_.get(); }  ///< nullptr without contact points
-  const ContactProblem<d>& posed() const { return posed_; }                  ///< of the step tried last
+  const ContactSolver<d>* contact_solver() const {
+    return systems_->contact.get();
+  }                                                          ///< nullptr without contact points
+  const ContactProblem<d>& posed() const { return posed_; }  ///< of the step tried last
   const Cost& cost() const { return cost_; }
-  Factor* momentum_factor() { return momentum_.get(); }  ///< nullptr without motion
-  Factor* heat_factor() { return heat_.get(); }          ///< nullptr without heat and when monolithic
+  Factor* momentum_factor() { return systems_->momentum.get(); }  ///< nullptr without motion
+  Factor* heat_factor() { return systems_->heat.get(); }          ///< nullptr without heat and when monolithic
   std::string solver() const;
 
  private:
@@ -148,9 +164,6 @@ class Stepper {
 
   void take_state();
   StepReport<d> attempt(const StepLoads& loads);
-  void take_factors();
-  void take_motion(Mat a, int width, Symmetry symmetry, const std::string& name);
-  std::vector<std::string> parts_in_contact(bool mechanical) const;
   void take_vectors();
   void momentum_right_side(const StepLoads& loads, const Eigen::VectorXd& from);
   Eigen::VectorXd reduce(Vec right, Vec external);
@@ -185,8 +198,8 @@ class Stepper {
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
-  bool monolithic() const { return options_.coupling == Coupling::monolithic && momentum_ && now_.theta; }
-  bool reactive() const { return heat_ && surface_.points() > 0 && problem_.contact_heats(); }
+  bool monolithic() const { return options_.coupling == Coupling::monolithic && systems_->momentum && now_.theta; }
+  bool reactive() const { return systems_->heat && surface_.points() > 0 && problem_.contact_heats(); }
   bool measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const;
   bool iterative() const;
   bool in_range(const Eigen::VectorXd& values) const;
@@ -198,16 +211,13 @@ class Stepper {
   const ContactSurface<d>& surface_;
   StepperOptions options_;
   BalanceEvaluator<d> evaluator_;
-  double coupled_scale_ = 1;
-  std::unique_ptr<Factor> momentum_, heat_;  // monolithic: momentum_ holds both fields
-  RigidMotions rigid_, constants_;           // of motion and of heat, where nothing is prescribed
-  std::unique_ptr<ContactSolver<d>> contact_;
+  std::shared_ptr<SystemCache<d>> cache_;
+  std::shared_ptr<StepSystems<d>> systems_;  // of the present step size
   TimeLevel now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
   VecHandle correction_strained_;                // the correction but for a rigid motion
   Eigen::VectorXd correction_force_;             // of the contact points
-  Eigen::MatrixXd carried_;                      // velocities of the contact points in the rigid motions
-  VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for rigid_ and constants_
+  VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for motions solved for apart
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
   Eigen::VectorXd free_;                         // velocity of the contact points without contact force
   Eigen::VectorXd rigid_load_;                   // load on the rigid motions
@@ -218,9 +228,17 @@ class Stepper {
   std::vector<Status> status_;
   Errors errors_;  // of the step that is being taken
   FieldExtents extents_;
+  struct Before {
+    Eigen::VectorXd contact_force;
+    std::vector<Status> status;
+    FieldExtents extents;
+    double time;
+  };
+  std::optional<Before> before_;  // the last step, whose levels are in `next_`
   bool undetermined_ = false;
   double grazing_ = 1;  // the contact force over a hundredth of the largest force, at most 1
   double time_ = 0;
+  int taken_ = 0;  // steps, those before the state that was given included
   Cost cost_;
 };
 

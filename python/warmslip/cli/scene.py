@@ -48,10 +48,12 @@ def run(
     for odd in plan.plan(checked).suspicious if rank == 0 else ():
         console.print(f"note: {odd}", highlight=False, soft_wrap=True, markup=False)
     with progress_bar(rank) as bar:
-        task = bar.add_task("stepping", total=checked.time.steps, note="")
+        task = bar.add_task("stepping", total=checked.clock.steps, note="")
 
         def progress(step: int, steps: int, report: Any) -> None:
-            bar.update(task, completed=step, note=f"open {report.open} stick {report.stick} slip {report.slip}")
+            bar.update(
+                task, completed=step, total=steps, note=f"open {report.open} stick {report.stick} slip {report.slip}"
+            )
 
         result = run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if rank == 0:
@@ -158,7 +160,8 @@ def explain(
 
         found = cost.measured(checked)
     else:
-        from warmslip.model.materials import cell_regions, make_mesh
+        from warmslip.model.materials import cell_regions
+        from warmslip.model.meshes import make_mesh
 
         found = plan.plan(checked)
         cell_regions(checked, make_mesh(checked))  # what else a run would refuse

@@ -46,7 +46,7 @@ def state_number(t: Trajectory, time: float | None) -> int:
 
 def contact_at(t: Trajectory, d: Discretisation, number: int) -> dict[str, Array]:
     """Contact fields of a stored state, see `contact_fields`, and the points' displacement; empty where there are none."""
-    step = round(float(t.time[number]) / d.scene.step) - 1
+    step = t.step_of(number)
     if step < 0 or not len(d.surface.weights):
         return {}
     force, moved, status, gap = (

@@ -9,7 +9,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-from warmslip.io.trajectory_writer import BALANCES, REPORT
+from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
 from warmslip.typing import Array
@@ -131,6 +131,11 @@ class Trajectory:
     def time(self) -> Array:
         """Times of the stored states, (states,)."""
         return np.asarray(self._state("time"))
+
+    def step_of(self, state: int) -> int:
+        """The step at whose end a stored state is, counted from 0 as in `contact`; -1 for the start."""
+        times = self._read["steps/time"][: self._steps]
+        return int(step_numbers(self.time[[state]], times)[0]) - 1
 
     @property
     def u(self) -> Any:

@@ -50,6 +50,11 @@ class Ballast:
         self._path.unlink(missing_ok=True)
 
 
+def step_numbers(states: Array, steps: Array) -> Any:
+    """The numbers of the steps at whose ends (`steps`, times) the times of `states` (n,) are; 0 for the start."""
+    return np.searchsorted(steps, states) + (states > 0)
+
+
 class TrajectoryWriter:
     """Appends steps as they come and flushes them every second, so that a run that is killed is readable to its last second.
 
@@ -152,7 +157,7 @@ class TrajectoryWriter:
         # a killed writer leaves its mark, which this way of reading looks past
         with h5py.File(earlier, "r", libver="latest", swmr=True) as file:
             every = self._d.scene.output.every
-            reached = np.rint(np.asarray(file["states/time"]) / self._d.scene.step).astype(int)
+            reached = step_numbers(np.asarray(file["states/time"]), np.asarray(file["steps/time"]))
             due = np.flatnonzero(
                 (reached <= keep) & (reached % every == 0)
             )  # not the last one of a run that was stopped

@@ -17,7 +17,8 @@ from warmslip.messages import quoted
 from warmslip.model.contact_laws import CheckedLaw, Law
 from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, data, evaluate
-from warmslip.model.materials import contact_part, make_mesh, materials, of_dim
+from warmslip.model.materials import contact_part, materials, of_dim
+from warmslip.model.meshes import make_mesh
 from warmslip.model.prescribed import PrescribedContact
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
@@ -70,7 +71,7 @@ class Discretisation:
             self.problem,
             self.operators,
             self.surface,
-            k=scene.step,
+            k=scene.clock.step(1)[1],
             coupling=getattr(Coupling, scene.time.coupling),
             backend=getattr(Backend, backend),
             contact=options,

@@ -29,7 +29,7 @@ def before(d: Discretisation) -> list[str]:
 
 def _coupling(d: Discretisation) -> list[str]:
     """A coupling that makes motion and temperature grow, where the tensors alone say so."""
-    scheme, step = d.scene.time.coupling, d.scene.step
+    scheme, step = d.scene.time.coupling, d.scene.step  # the longest
     found = coupled(d.problem.materials)
     finest = (np.pi * float(np.linalg.norm(gradients(_corners(d)), axis=-1).max())) ** 2 if found else 0.0
     limits = [one.limit(scheme) for one in found if one.cancels and scheme == "staggered" and one.feeds(step, finest)]
@@ -60,7 +60,7 @@ def _starts(d: Discretisation) -> list[str]:
     scene = d.scene
     if scene.heat is None:
         return []
-    step, out = scene.step, []
+    step, out = scene.clock.shortest, []
     lumped = scene.heat.capacity_matrix == "lumped"
     parts: list[tuple[str, Any, float]] = [
         (part, d.loads.temperature.get(part, 0.0), np.inf) for part in scene.supports.temperature

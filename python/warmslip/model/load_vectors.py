@@ -125,7 +125,7 @@ class LoadVectors:
         self._points = {i: np.flatnonzero(np.asarray(surface.contacts, int) == i) for i in touching}
         self._reactive = conducts and any(c.heats for c in scene.contacts)
         self._kept: dict[str, Array] = {}
-        self._try(scene.step)
+        self._try(scene.clock.step(1)[0])
 
     @property
     def of_time(self) -> bool:

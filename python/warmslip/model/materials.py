@@ -1,4 +1,4 @@
-"""From the tables of a scene to the core's values: mesh, materials by region, contact parts."""
+"""From the tables of a scene to the core's values: materials by region, contact parts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip._core import ContactLaw, ContactPart, Diagonal, Friction, NormalCompliance
+from warmslip._core import ContactLaw, ContactPart, Friction, NormalCompliance
 from warmslip.mesh import files
 from warmslip.mesh.refinement import refined
 from warmslip.model.contact_laws import CheckedLaw
@@ -79,24 +79,6 @@ def _matrix(value: Any, dim: int) -> Array:
 
 def _read(table: MeshTable) -> files.MeshFile:
     return refined(files.read(str(table.file)), table.refine)
-
-
-def make_mesh(scene: Scene) -> Any:
-    """The scene's mesh as a `_core.Mesh2` or `_core.Mesh3`."""
-    table = scene.mesh
-    kind = of_dim("Mesh", table.dim)
-    if table.file is not None:
-        read = _read(table)
-        return kind.from_lists(read.nodes, read.cells, read.parts)
-    mesh = kind.box(table.counts, table.sides, getattr(Diagonal, table.diagonal))
-    if table.grading is None:
-        return mesh
-    nodes = np.array(mesh.nodes)
-    for axis, (ratio, length) in enumerate(zip(table.grading, table.sides, strict=True)):
-        if ratio != 1:  # a geometric row of cells, of which twice as many have all its nodes
-            with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
-                nodes[:, axis] = length * np.expm1(np.log(ratio) * nodes[:, axis] / length) / (ratio - 1)
-    return kind.from_lists(nodes, mesh.cells, {name: np.array(facets) for name, facets in mesh.parts.items()})
 
 
 def materials(scene: Scene, mesh: Any) -> tuple[list[Any], Any]:

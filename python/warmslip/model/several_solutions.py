@@ -71,7 +71,7 @@ def condensed(d: Discretisation, stepper: Any) -> ContactPoints:
         compliance=compliance,
         normals=np.asarray(d.surface.normals),
         weights=np.asarray(d.surface.weights),
-        step=d.scene.step,
+        step=stepper.step,
         stiffness=np.array(rises)[part],
         friction=np.array([_coefficient(c) for c in contacts])[part],
         rubs=np.array([c.friction is not None or f"laws.{c.part}.friction" in d.user_functions for c in contacts])[

@@ -120,7 +120,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
         tried = trial(simulation, Path(folder))
         finish(simulation, Path(folder))
         output = time.perf_counter() - begin - sum(tried.steps) - tried.extra
-    output += (scene.time.steps - 1) // scene.output.checkpoint * tried.checkpoint
+    output += (scene.clock.steps - 1) // scene.output.checkpoint * tried.checkpoint
     taken = len(tried.steps)
     step = tried.step if taken else float("nan")
     found = plan(scene)
@@ -141,7 +141,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
         setup_seconds=setup,
         step_seconds=step,
         output_seconds=output,
-        seconds=setup + sum(tried.steps) + (scene.time.steps - taken) * step + output,
+        seconds=setup + sum(tried.steps) + (scene.clock.steps - taken) * step + output,
         memory_bytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0,
     )
 
@@ -166,7 +166,7 @@ def table(repeats: int = 3, progress: Callable[[int, int], None] | None = None) 
         rows.append(
             {
                 "scene": name,
-                "steps": scene.time.steps,
+                "steps": scene.clock.steps,
                 "predicted_s": middle,
                 "measured_s": real,
                 "ratio": middle / real,

@@ -9,20 +9,29 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from warmslip.scene.clock import Clock, graded, uniform
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Value
 from warmslip.scene.material_tables import HeatTable, InertiaTable, IsotropicTable, RegionTable
 from warmslip.scene.mesh_table import MeshTable
-from warmslip.scene.types import Count, Positive, Table, Values, _listed
+from warmslip.scene.types import Count, NonNegative, Positive, Table, Values, _listed
 
 
 class TimeTable(Table):
-    """`steps` uniform steps of backward Euler to time `end`."""
+    """Steps of backward Euler to time `end`: equal, shrinking towards given times, or chosen by their estimated error."""
 
     end: Positive = 1.0
     """Last time T."""
     steps: Count = 32
-    """Number of steps; the step size is k = end/steps."""
+    """Number of steps where all are equal. Else the longest step is at most end/steps, and there are more."""
+    graded_to: list[NonNegative] = []
+    """Times towards which the steps shrink, such as 0.0 for a sudden start, or the time of a jump of the loads. The steps form
+    blocks of equal steps whose lengths double away from such a time; every step size costs one factorization."""
+    halvings: Annotated[int, Field(ge=1, le=40, strict=True)] = 8
+    """With graded_to: how often the length of the last block is halved to give the first one."""
+    tolerance: Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)] | None = None
+    """Step sizes follow the solution: the estimated error of a single step, relative to the fields, stays below this. The sizes
+    are end/steps times powers of 1/2. A tolerance of 1e-4 is moderate; the error at the end falls like its square root."""
     coupling: Literal["staggered", "lagged", "monolithic"] = "staggered"
     """What motion and heat know of each other in a step: old temperature and new velocity, both old, or both new."""
 
@@ -124,9 +133,17 @@ class SceneTables(Table):
         return self.contact if isinstance(self.contact, list) else [self.contact]
 
     @property
+    def clock(self) -> Clock:
+        """The steps. With a tolerance they are chosen as the run goes on; these are then the longest ones."""
+        time = self.time
+        if time.graded_to:
+            return graded(time.end, time.steps, time.graded_to, time.halvings)
+        return uniform(time.end, time.steps)
+
+    @property
     def step(self) -> float:
-        """k, time."""
-        return self.time.end / self.time.steps
+        """k, the size of the longest step, time."""
+        return self.clock.longest
 
     def resolved(self) -> dict[str, Any]:
         """The scene as plain data, defaults filled in and absent tables left out."""

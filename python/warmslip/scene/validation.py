@@ -276,8 +276,21 @@ def _regions(scene: SceneTables) -> Iterator[str]:
 
 
 def _time(scene: SceneTables) -> Iterator[str]:
-    if scene.step < SHORTEST:
-        yield f"time: a step of {scene.step:g} is too short to divide by; take fewer steps or a later end"
+    time = scene.time
+    if time.graded_to and time.tolerance is not None:
+        yield "time.graded_to: steps with a tolerance find such times themselves; give one of graded_to and tolerance"
+    if time.halvings != type(time).model_fields["halvings"].default and not time.graded_to:
+        yield "time.halvings: halvings of what? give graded_to = [0.0], or leave the key out"
+    if len(set(time.graded_to)) < len(time.graded_to):
+        yield "time.graded_to: a time is named twice; name each once"
+    if late := [t for t in time.graded_to if t > time.end]:
+        yield f"time.graded_to: {late[0]:g} is later than the end, {time.end:g}; leave it out"
+        return
+    shortest = scene.clock.shortest
+    if shortest < SHORTEST:
+        yield f"time: a step of {shortest:g} is too short to divide by; take fewer steps or a later end"
+    if scene.clock.steps >= 2**31:
+        yield f"time: there are {scene.clock.steps} steps, and they are counted in 32 bits; take fewer"
 
 
 def _plane(scene: SceneTables) -> Iterator[str]:

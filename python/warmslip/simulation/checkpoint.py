@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip.simulation import monitor
+from warmslip.simulation import monitor, pace
 from warmslip.simulation.statistics import Statistics
 from warmslip.typing import Array
 
@@ -34,6 +34,7 @@ class Checkpoint:
     owner: dict[str, Any]
     step: int
     time: float
+    pace: dict[str, Any]
     statistics: Statistics
     seen: dict[str, Any]
     extents: list[float]
@@ -67,6 +68,7 @@ class Checkpoint:
             and math.isfinite(self.time)
             and type(self.step) is int
             and self.statistics.sound
+            and pace.fits(self.pace, other.pace)
             and monitor.fits(self.seen, other.seen)
             and len(self.extents) == len(other.extents)
             and all(type(value) is float and 0 <= value < math.inf for value in self.extents)
@@ -85,8 +87,8 @@ def _whole(path: Path) -> Checkpoint | None:
         return None
 
 
-def read(folder: Path, start: Checkpoint, steps: int) -> Checkpoint | None:
-    """The newest whole checkpoint in a folder of the run that begins with `start` and takes `steps`, None if there is none.
+def read(folder: Path, start: Checkpoint) -> Checkpoint | None:
+    """The newest whole checkpoint in a folder of the run that begins with `start`, None if there is none.
 
     Raises ValueError when the only whole ones belong to another scene, code or number of ranks.
     """
@@ -97,16 +99,16 @@ def read(folder: Path, start: Checkpoint, steps: int) -> Checkpoint | None:
             continue
         if other := [key for key, value in start.owner.items() if found.owner.get(key) != value]:
             foreign = f"{folder / name} is of another {' and '.join(other)}"
-        elif _sound(found, start, steps):
+        elif _sound(found, start):
             return found
     if foreign := foreign or _of_another_scene(folder, start.owner["scene"]):
         raise ValueError(f"{foreign}; run it as it was, or without --resume from the start")
     return None
 
 
-def _sound(found: Checkpoint, start: Checkpoint, steps: int) -> bool:
+def _sound(found: Checkpoint, start: Checkpoint) -> bool:
     try:
-        return found.resembles(start) and 0 < found.step <= steps
+        return found.resembles(start) and 0 < found.step == found.pace["taken"]
     except (AttributeError, TypeError, ValueError):  # entries of other types
         return False
 

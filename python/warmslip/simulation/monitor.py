@@ -21,6 +21,7 @@ from warmslip.model.loads import data as read
 from warmslip.scene import plausibility
 from warmslip.scene.scene import Scene
 from warmslip.simulation import growth
+from warmslip.simulation.pace import Step
 from warmslip.simulation.statistics import Statistics
 
 
@@ -53,13 +54,15 @@ class Monitor:
             "penetration": 0.0,
             "strain": 0.0,
             "energy": 0.0,
-            "looked": 0,
+            "looked": 0.0,
             "phase": 0 if scene.initial.velocity is not None else None,
             "shortest": None,
             "low": {},
             "high": {},
             "growth": {},
             "course": growth.start(),
+            "size": 0.0,  # of the steps of the course, and the time of its start
+            "since": 0.0,
         }
         scheme = scene.time.coupling
         both = coupled(self._d.problem.materials) if scene.moves and scene.heat is not None else []
@@ -67,8 +70,8 @@ class Monitor:
         self._driven = bool(self._coupled) and self._d.load_vectors.of_time
         self._given: list[float] = []  # norms of the data of the last step
 
-    def step(self, report: Any, n: int, data: Any) -> None:
-        """After step n with its data (collective when it looks at a field)."""
+    def step(self, report: Any, step: Step, data: Any) -> None:
+        """After a step with its data (collective when it looks at a field)."""
         seen = self.seen
         seen["undetermined"] += report.undetermined
         if self._law:
@@ -80,19 +83,22 @@ class Monitor:
             if self._impacts:
                 self._phase(touching)
         if self._coupled:
-            self._growth(report.balances, data)
-        if n & (n - 1) == 0:
+            self._growth(report.balances, step, data)
+        if step.number & (step.number - 1) == 0:
             self._temperatures()
         energy = report.balances.elastic
-        if energy > 4 * seen["energy"] and n - seen["looked"] >= self._scene.time.steps / 4:
-            seen["energy"], seen["looked"] = energy, n
+        if energy > 4 * seen["energy"] and step.time - seen["looked"] >= self._scene.time.end / 4:
+            seen["energy"], seen["looked"] = energy, step.time
             self._strain()
 
-    def _growth(self, balances: Any, data: Any) -> None:
+    def _growth(self, balances: Any, step: Step, data: Any) -> None:
         """Looks for a climb of the energy of what a step changes, which is backward Euler's own dissipation.
 
-        Without a change of data that energy falls in every step that does not grow, for R = -c M by theorem.
+        Without a change of data that energy falls in every step that does not grow, for R = -c M by theorem. It changes with the
+        size of the step, and a climb is one of equal steps.
         """
+        if step.size != self.seen["size"]:
+            self.seen |= {"course": growth.start(), "size": step.size, "since": step.time - step.size}
         heat = max(one.weight for one in self._coupled) * balances.heat_damping
         square = balances.inertia_damping + balances.elastic_damping + heat
         row = [growth.log(square), *self._changes(data)]
@@ -100,8 +106,8 @@ class Monitor:
             return
         found = growth.climb(self.seen["course"])
         if found and found["total"] >= self.seen["growth"].get("total", 0.0):
-            step = self._scene.step
-            self.seen["growth"] = found | {name: found[name] * step for name in ("begin", "end")}
+            since = self.seen["since"]
+            self.seen["growth"] = found | {name: since + found[name] * step.size for name in ("begin", "end")}
 
     def _changes(self, data: Any) -> list[float]:
         """Logarithms of the squares of how much the norms of the data changed, none where all are constant."""

@@ -95,7 +95,7 @@ def run(
     observers : sequence of callables
         Called as `observer(state, report)` after every step, on every rank.
     progress : callable, optional
-        Called as `progress(step, steps, report)` after every step, on rank 0.
+        Called as `progress(step, steps, report)` after every step, on rank 0; with a tolerance, `steps` is what is expected.
     resume : bool
         Continue from the newest whole checkpoint in `out`. On one process the end is bitwise that of an uninterrupted run; on
         several it agrees to round-off. Without a checkpoint the run starts from the beginning, unless the same run was
@@ -148,7 +148,7 @@ def run(
         for state, report in simulation.steps():
             writer.step(report, simulation.taken)
             asked, late = stop.agreed(simulation.comm, minutes is not None and time.monotonic() - saved > 60 * minutes)
-            last = simulation.taken == scene.time.steps
+            last = simulation.finished
             if folder is not None and not last and (asked or late or simulation.taken % scene.output.checkpoint == 0):
                 writer.write()  # no checkpoint is ahead of its trajectory
                 saving = simulation.take_checkpoint()
@@ -158,7 +158,7 @@ def run(
             for observer in observers:
                 observer(state, report)
             if progress and rank == 0:
-                progress(simulation.taken, scene.time.steps, report)
+                progress(simulation.taken, simulation.pace.expected, report)
             if asked and not last:
                 simulation.outcome = "interrupted"
                 break
@@ -182,7 +182,7 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
             if answer["outcome"] == "completed" and same and not answer["functions"]:
                 with Trajectory(folder / "trajectory.h5") as t:
                     u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
-                    if round(float(t.time[-1]) / simulation.scene.step) == simulation.scene.time.steps:
+                    if float(t.time[-1]) == simulation.scene.time.end:
                         found = Result(answer, u, w, theta, folder / "trajectory.h5")
         except (OSError, ValueError, LookupError, TypeError):
             pass  # then it is run

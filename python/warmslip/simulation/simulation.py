@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,11 @@ from warmslip.model.loads import Loads
 from warmslip.model.state import State
 from warmslip.records import provenance
 from warmslip.scene.scene import Scene
-from warmslip.simulation import checkpoint, ranks
+from warmslip.simulation import checkpoint, pace, ranks
 from warmslip.simulation.checkpoint import Checkpoint
+from warmslip.simulation.local_error import LocalError
 from warmslip.simulation.monitor import Monitor
+from warmslip.simulation.pace import AdaptivePace, Step
 from warmslip.simulation.statistics import FIELDS, Statistics, digits, estimates, residuals
 
 log = logging.getLogger(__name__)
@@ -91,51 +93,96 @@ class Simulation:
         self.failure: dict[str, Any] | None = None
         self.report: Any = None
         self.monitor = Monitor(scene, self.discretisation, self.stepper, self.comm)
-        self._resumed = 0  # steps of an earlier process
+        self.pace = pace.pace(scene)
+        adaptive = isinstance(self.pace, AdaptivePace)
+        self.local_error = LocalError(self.discretisation, self.stepper, scene.step) if adaptive else None
         log.info("%d unknowns on %d ranks; %s", self.discretisation.unknowns, self.comm.size, self.stepper.solver)
 
     @property
     def taken(self) -> int:
         """Steps so far, those of an earlier process that this one goes on from included."""
-        return self._resumed + int(self.stepper.cost.steps)
+        return self.pace.taken
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last step was taken."""
+        return self.pace.next() is None
+
+    @cached_property
+    def _price(self) -> float:
+        """About how many steps a factorization costs."""
+        return float(self.stepper.refactoring_price)
 
     def steps(self) -> Iterator[tuple[State, Any]]:
         """Advances to the end, yielding the state and the report of every step (`_core.StepReport`, with its `balances`).
 
         Ends before a step that is rejected, whose state is not kept: see `outcome` and `failure`. Collective.
         """
-        moving = self.discretisation.prescribed.of_time
-        for n in range(self.taken + 1, self.scene.time.steps + 1):
-            try:
-                loads = self.discretisation.load_vectors.at(n * self.scene.step, self.scene.step)
-            except ValueError as error:  # a formula that gives no finite number; on every rank
-                self._stop("data_not_finite", n, str(error))
+        while (step := self.pace.next()) is not None:
+            if (loads := self._data(step)) is None:
                 return
-            if moving and (why := self.discretisation.prescribed.inside(n * self.scene.step)):
-                self._stop("support_inside_foundation", n, why)
-                return
-            for law in self.discretisation.laws:
-                for function in law.functions:
-                    function.reset()
-            report = self.stepper.advance(*loads, measured=n == self.scene.time.steps)
+            if self.local_error is not None:
+                self.local_error.remember(self.stepper)
+            report = self.stepper.advance(*loads, measured=step.last, time=step.time)
             self.statistics.attempted(report)
             if report.outcome != Outcome.completed:
                 wrong = self._law_violation()
-                known = {name: value for name, value in residuals(report).items() if value == value}  # not computed
-                if errors := estimates(report):
-                    known["digits"] = digits(errors)  # type: ignore[assignment]
-                outcome = "law_failed" if wrong else report.outcome.name
-                self._stop(outcome, n, wrong or self.monitor.reason(report.reason), **known)
+                if not wrong and isinstance(self.pace, AdaptivePace) and self.pace.fail():
+                    continue
+                self._reject(step, report, wrong)
                 return
+            if not self._good_enough(step):
+                continue
             self.report = report
-            self.monitor.step(report, n, loads)
+            self.monitor.step(report, step, loads)
             self.statistics.taken(report, self._by_place)
             if log.isEnabledFor(logging.DEBUG):
                 balances = ", ".join(f"{name} {value:.1e}" for name, value in residuals(report).items())
-                log.debug("step %d: %d Newton iterations, %s", n, report.newton_iterations, balances)
-            yield State(self.discretisation, self.stepper, n), report
+                log.debug("step %d: %d Newton iterations, %s", step.number, report.newton_iterations, balances)
+            yield State(self.discretisation, self.stepper, step.number), report
+
+    def _data(self, step: Step) -> Any:
+        """The data of a step, for whose size the stepper is made ready; None where the run stops instead (collective)."""
+        prescribed = self.discretisation.prescribed
+        try:
+            loads = self.discretisation.load_vectors.at(step.time, step.size)
+        except ValueError as error:  # a formula that gives no finite number; on every rank
+            return self._stop("data_not_finite", step.number, str(error))
+        if prescribed.of_time and (why := prescribed.inside(step.time)):
+            return self._stop("support_inside_foundation", step.number, why)
+        try:
+            self.stepper.set_step(step.size)
+        except ValueError as error:
+            return self._stop("solver_failed", step.number, str(error))
+        for law in self.discretisation.laws:
+            for function in law.functions:
+                function.reset()
+        return loads
+
+    def _good_enough(self, step: Step) -> bool:
+        """Counts a step that was solved; one whose estimated error is too large is taken back instead (collective)."""
+        if not isinstance(self.pace, AdaptivePace):
+            self.pace.accept(step.size)
+            return True
+        assert self.local_error is not None
+        estimate = self.local_error.of(self.stepper, step.size)
+        if not self.pace.judge(estimate):
+            self.stepper.revert()
+            return False
+        self.local_error.take(step.size)
+        self.pace.accept(estimate, self._price)
+        return True
+
+    def _reject(self, step: Step, report: Any, wrong: str | None) -> None:
+        """Stops at a step that was not solved, or in which a law of the user's did `wrong`."""
+        known = {name: value for name, value in residuals(report).items() if value == value}  # not computed
+        if errors := estimates(report):
+            known["digits"] = digits(errors)  # type: ignore[assignment]
+        outcome = "law_failed" if wrong else report.outcome.name
+        self._stop(outcome, step.number, wrong or self.monitor.reason(report.reason), **known)
 
     def _stop(self, outcome: str, step: int, reason: str, **numbers: Any) -> None:
+        """Ends the run before a step."""
         self.outcome, self.failure = outcome, {"step": step, "reason": reason} | numbers
         log.info("step %d rejected: %s", step, outcome)
 
@@ -158,6 +205,11 @@ class Simulation:
         arrays = {name: values for name, values in fields.items() if values is not None}
         arrays |= {"rigid": np.asarray(stepper.rigid)} if "strained" in arrays else {}
         arrays |= {"contact_force": np.asarray(stepper.contact_force), "status": np.asarray(stepper.status, dtype=int)}
+        progress = self.pace.state()
+        if self.local_error is not None:
+            numbers, changes = self.local_error.state()
+            progress |= numbers
+            arrays |= changes
         owner = {
             "scene": self.scene.digest(),
             "code": _fingerprint(),
@@ -166,7 +218,7 @@ class Simulation:
             "set of Python functions": list(d.user_functions),
         }
         return Checkpoint(
-            owner, self.taken, stepper.time, self.statistics, self.monitor.seen, list(stepper.extents), arrays
+            owner, self.taken, stepper.time, progress, self.statistics, self.monitor.seen, list(stepper.extents), arrays
         )
 
     def restore(self, state: Checkpoint) -> None:
@@ -180,10 +232,12 @@ class Simulation:
             self.stepper.part(*parted, arrays["rigid"])
             for vector in parted:
                 vector.destroy()
-        self.stepper.resume(arrays["contact_force"], arrays["status"].tolist(), state.extents)
+        self.stepper.resume(arrays["contact_force"], arrays["status"].tolist(), state.extents, state.step)
         self.statistics = state.statistics
         self.monitor.seen |= state.seen
-        self._resumed = state.step
+        self.pace.restore(state.pace)
+        if self.local_error is not None:
+            self.local_error.restore(state.pace, arrays)
 
     def resume(self, folder: Path) -> int:
         """Goes on from the newest whole checkpoint in `folder`; the step it goes on from, 0 if there is none (collective).
@@ -194,7 +248,7 @@ class Simulation:
         start, found, refusal = self.take_checkpoint(), None, ""
         if self.comm.rank == 0:
             try:
-                found = checkpoint.read(folder, start, self.scene.time.steps)
+                found = checkpoint.read(folder, start)
             except ValueError as error:
                 refusal = str(error)
         found, refusal = self.comm.bcast((found, refusal), root=0)
@@ -202,4 +256,4 @@ class Simulation:
             raise ValueError(refusal)
         if found is not None:
             self.restore(found)
-        return self._resumed
+        return self.taken

@@ -39,6 +39,8 @@ def summary(simulation: Simulation) -> dict[str, Any]:
         "warnings": simulation.warnings(),
         "time": s.time,
         "steps": simulation.taken,
+        "step_sizes": [[size, count] for size, count in simulation.pace.record.sizes.items()],
+        "rejected_steps": simulation.pace.record.rejected + simulation.pace.record.failed,
         "functions": d.user_functions,
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),

@@ -14,7 +14,7 @@ import numpy as np
 
 from warmslip._core import Mesh2, Mesh3, Outcome
 from warmslip.model.discretisation import Discretisation, discretise
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.records.check import Check, below
 from warmslip.scene.full import FullScene
 from warmslip.simulation.simulation import Simulation

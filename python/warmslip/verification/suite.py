@@ -9,10 +9,9 @@ from warmslip.records import tables
 from warmslip.records.check import Check
 from warmslip.scene.full import full_model
 from warmslip.scene.reader import load
-from warmslip.verification import invariances, uncertainty
+from warmslip.verification import graded_study, invariances, uncertainty
 from warmslip.verification.assumptions import runs
 from warmslip.verification.exact import cases
-from warmslip.verification.grading import study
 from warmslip.verification.mms import solutions
 from warmslip.verification.theory import error_bound, existence
 
@@ -54,13 +53,13 @@ def convergence(folder: Path) -> list[Check]:
     """Figure 5, done right: the paper's problem on graded and on uniform grids, the reference's own error taken off."""
     scene = full_model(load("paper_mixed")).override(**HOT)
     studies = {
-        "graded": study.unbiased(study.study(scene, study.grids(scene), [32, 64, 128, 256], 512), 512),
-        "uniform": study.unbiased(study.study(scene, study.UNIFORM, [16, 32, 64, 128], 256), 256),
+        "graded": graded_study.unbiased(graded_study.study(scene, graded_study.GRADED, [32, 64, 128, 256], 512), 512),
+        "uniform": graded_study.unbiased(graded_study.study(scene, graded_study.UNIFORM, [16, 32, 64, 128], 256), 256),
     }
     tables.write(
         folder / "graded_table.csv", [{"grids": name, **row} for name, rows in studies.items() for row in rows]
     )
-    return study.lines("paper_mixed, theta_F = 10", scene, studies["graded"], studies["uniform"])
+    return graded_study.lines("paper_mixed, theta_F = 10", scene, studies["graded"], studies["uniform"])
 
 
 def value_and_uncertainty(folder: Path) -> list[Check]:

@@ -11,7 +11,7 @@ import warmslip
 from warmslip import _core
 from warmslip.mesh import files
 from warmslip.mesh.refinement import refined
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.studies import refinement_study
 
 FILES = ["plate_with_hole.msh", "block_with_hole.msh"]

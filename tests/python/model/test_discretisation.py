@@ -14,7 +14,7 @@ from reference import scipy_scheme
 from warmslip import _core
 from warmslip.model.discretisation import discretise, von_mises
 from warmslip.model.loads import Loads, evaluate
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.scene.reader import load
 from warmslip.scene.scene import Scene
 

@@ -73,8 +73,14 @@ FILE: dict[str, Any] = {
     "time": {"end": 1.0, "steps": 1},
     "heat": {"conductivity": 1.0},
 }
+GRADED = {
+    "mesh": {"n": 8, "graded_to": [{"at": "corners", "exponent": 0.6}, {"at": "top"}, "left", [0.0, 0.5]]},
+    "time": {"end": 1.0, "steps": 2, "graded_to": [0.0, 0.5], "halvings": 3},
+    "heat": {"conductivity": 1.0},
+}
+ADAPTIVE = FILE | {"time": {"end": 1.0, "steps": 2, "tolerance": 0.1}}
 SEVERAL = WHOLE | {"contact": [CONTACT, {"part": "right", "stiffness": 1.0}]}
-SCENES = {"whole": WHOLE, "file": FILE, "several": SEVERAL}
+SCENES = {"whole": WHOLE, "file": FILE, "graded": GRADED, "adaptive": ADAPTIVE, "several": SEVERAL}
 NEVER = [True, "no such thing!", {"surprise": 1.0}, [], [[]], [1.0] * 7, math.nan, math.inf, -math.inf, None, 10**400]
 HOLDS: dict[str, list[int]] = {  # which of those a key can hold
     "title": [1],

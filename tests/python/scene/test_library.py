@@ -16,7 +16,7 @@ from support.folders import DOCS
 from support.processes import Command
 
 import warmslip
-from warmslip.model import materials
+from warmslip.model import meshes
 from warmslip.report import cost
 from warmslip.scene import plan
 from warmslip.scene.reader import library
@@ -293,7 +293,7 @@ def test_a_bent_contact_part_is_worth_a_second_look(tmp_path: Path) -> None:
     """Two sides of a square as one part: their corner has a point for each."""
     bent = warmslip.load("quasistatic_punch").override(**{"mesh.n": 4, "time.steps": 5, "contact.part": "left"})
     assert not any("differ in normal" in message for message in cost.measured(bent).suspicious)
-    mesh = materials.make_mesh(bent)
+    mesh = meshes.make_mesh(bent)
     parts = {name: np.array(facets) for name, facets in mesh.parts.items()}
     parts = {"top": parts["top"], "shoe": np.concatenate([parts["left"], parts["bottom"]])}
     cells = [("triangle", np.array(mesh.cells)), ("line", np.concatenate(list(parts.values())))]

@@ -10,7 +10,7 @@ from support.folders import DOCS
 from support.sensible import FALLING, KELVIN, PRESSED, WARM, body
 
 import warmslip
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.scene import plan, plausible_data
 from warmslip.scene.reader import build
 

@@ -19,6 +19,7 @@ from warmslip.report import cost
 from warmslip.scene import plan
 from warmslip.scene.reader import build
 from warmslip.simulation import growth
+from warmslip.simulation.pace import Step
 from warmslip.simulation.summary import summary
 
 STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
@@ -330,7 +331,7 @@ def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, warned: 
     for n in range(60):
         heat = 1.2**n
         balances = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
-        simulation.monitor._growth(balances, [])
+        simulation.monitor._growth(balances, Step(n + 1, 0.1 * (n + 1), 0.1, last=False), [])
     assert bool(simulation.monitor.fed()) == warned
     share = simulation.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
     assert share == pytest.approx(0.0, abs=1e-12)

@@ -128,7 +128,13 @@ def test_a_mutant_is_seen(monkeypatch: pytest.MonkeyPatch, change: Mutant, case:
         wrong, data = change(scene, loads or Loads.of(scene))
         return assemble(wrong, loads=data, mesh=mesh)
 
+    simulation = fixtures.Simulation
     monkeypatch.setattr(fixtures, "discretise", discretise)
+    monkeypatch.setattr(
+        fixtures,
+        "Simulation",
+        lambda _, *, discretisation: simulation(discretisation.scene, discretisation=discretisation),
+    )
     try:
         red = failed(CASES[case]())
     except RuntimeError as stopped:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +9,13 @@ import numpy as np
 import pytest
 
 import warmslip
-from warmslip import _core
-from warmslip.model.discretisation import discretise
-from warmslip.model.materials import make_mesh
+from warmslip.model.corners import corners, elastic_exponent, thermal_exponent
+from warmslip.model.meshes import coarsest
 from warmslip.studies import rates
-from warmslip.verification import uncertainty
-from warmslip.verification.assumptions.corners import corner_exponents, elastic_exponent, thermal_exponent
-from warmslip.verification.grading import meshes as grading
-from warmslip.verification.grading import study
+from warmslip.verification import graded_study, uncertainty
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
-CORNERS = {(0.0, 1.0): 0.69, (1.0, 1.0): 0.69}
+CORNERS = [(0.0, 1.0), (1.0, 1.0)]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +34,8 @@ def test_elastic_exponents(angle: float, clamped: tuple[bool, bool], expected: f
 
 
 def test_the_papers_corners() -> None:
-    found = {c.point: c for c in corner_exponents(discretise(warmslip.load("paper_mixed").override(**{"mesh.n": 4})))}
+    scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4})
+    found = {c.point: c for c in corners(scene, coarsest(scene.mesh))}
     assert set(found) == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}
     for point in CORNERS:
         assert found[point].exponent_u == pytest.approx(rates.williams_exponent(10.0, 5.0), abs=1e-10)
@@ -63,62 +59,13 @@ def test_thermal_exponents() -> None:
     assert np.isnan(thermal_exponent(np.ones((2, 2)), sides, np.pi / 2, (True, False)))
 
 
-def test_graded_meshes_are_nested_and_graded() -> None:
-    scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4})
-    meshes = grading.family(grading.Triangulation.of(make_mesh(scene)), CORNERS, 4)
-    for coarse, fine in pairwise(meshes):
-        assert len(fine.cells) == 4 * len(coarse.cells)
-        x = fine.nodes[fine.cells]
-        area = np.linalg.det(x[:, 1:] - x[:, :1]) / 2
-        assert area.min() > 0
-        assert area.sum() == pytest.approx(1.0, abs=1e-14)
-        prolong = _core.prolongation(coarse.mesh(), fine.mesh())  # refuses meshes that are not nested
-        np.testing.assert_allclose(prolong @ coarse.nodes, fine.nodes, atol=1e-15)
-        assert set(fine.parts) == set(coarse.parts)
-        for part, facets in fine.parts.items():
-            assert len(facets) == 2 * len(coarse.parts[part])
-    finest = meshes[-1].nodes
-    for corner in CORNERS:  # every edge at it is graded, whichever end it is
-        at = int(np.linalg.norm(finest - corner, axis=1).argmin())
-        cells = meshes[-1].cells[(meshes[-1].cells == at).any(axis=1)]
-        lengths = np.linalg.norm(finest[np.setdiff1d(cells, at)] - corner, axis=1)
-        assert lengths.max() <= 0.25 * np.sqrt(2) * grading.ratio(0.69) ** 3 + 1e-15
-    assert grading.ratio(0.69) < 2 ** (-1 / 0.69)  # at equality a logarithm is lost
-    assert grading.ratio(1.0) == 0.5
-
-
-def test_grading_is_refused_where_it_cannot_be() -> None:
-    one = grading.Triangulation.of(make_mesh(warmslip.load("paper_mixed").override(**{"mesh.n": 1})))
-    with pytest.raises(ValueError, match="joins two graded nodes"):
-        grading.family(one, CORNERS, 2)
-    with pytest.raises(ValueError, match="no node"):
-        grading.family(one, {(0.3, 0.3): 0.5}, 2)
-
-
-def test_time_blocks_fill_the_time() -> None:
-    for halvings in (0, 1, 5):
-        blocks = grading.time_blocks(2.0, 4, halvings)
-        assert sum(b.k * b.steps for b in blocks) == pytest.approx(2.0, abs=1e-15)
-        assert len(blocks) == halvings + 1
-        for one, other in pairwise(blocks):
-            assert other.begin == pytest.approx(one.begin + one.k * one.steps)
-
-
-def test_uniform_blocks_are_the_plain_run() -> None:
-    scene = warmslip.load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8} | HOT)
-    advance = study.Member(scene, make_mesh(scene), grading.time_blocks(1.0, 8, 0))
-    for _ in advance.advance():
-        pass
-    np.testing.assert_array_equal(advance.discretisation.field(advance.stepper.theta), warmslip.run(scene).theta)
-
-
 @pytest.mark.slow
 def test_grading_restores_the_order() -> None:
     """A small version of the report's study: more than uniform grids in every term."""
     scene = warmslip.load("paper_mixed").override(**HOT)
     levels, reference = [8, 16, 32], 64
-    fine = study.unbiased(study.study(scene, study.grids(scene), levels, reference), reference)
-    plain = study.unbiased(study.study(scene, study.UNIFORM, levels, reference), reference)
+    fine = graded_study.unbiased(graded_study.study(scene, graded_study.GRADED, levels, reference), reference)
+    plain = graded_study.unbiased(graded_study.study(scene, graded_study.UNIFORM, levels, reference), reference)
     for term in ("u_V", "w_L2", "theta_L2"):
         assert fine[-1][f"order_{term}"] > 0.85, term
         assert fine[-1][f"order_{term}"] > plain[-1][f"order_{term}"], term
@@ -134,7 +81,7 @@ def test_bias_is_removed(p: float, q: str) -> None:
     rows: list[dict[str, Any]] = [
         {"n": round(1 / x), "h": x} | {f"e_{t}": e for t in rates.TERMS} for x, e in zip(h, seen, strict=True)
     ]
-    found = study.unbiased(rows, reference)
+    found = graded_study.unbiased(rows, reference)
     assert found[-1][f"order_{q}"] == pytest.approx(p, abs=1e-6)
     assert found[0][f"reference_{q}"] == pytest.approx(own, rel=1e-5)
 
@@ -145,7 +92,7 @@ def test_bias_is_removed(p: float, q: str) -> None:
 )
 def test_studies_that_say_nothing_are_refused(levels: list[int], reference: int, word: str) -> None:
     with pytest.raises(ValueError, match=word):
-        study.study(warmslip.load("paper_mixed"), study.UNIFORM, levels, reference)
+        graded_study.study(warmslip.load("paper_mixed"), graded_study.UNIFORM, levels, reference)
 
 
 @pytest.mark.parametrize("p", [0.7, 1.0, 1.6, 2.0])

@@ -11,7 +11,7 @@ import sympy as sp
 
 import warmslip
 from warmslip import Scene
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.records.check import Check
 from warmslip.simulation.summary import summary
 from warmslip.studies.error_norms import TERMS

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
+from warmslip.model.corners import Corner
+from warmslip.model.corners import corners as corners_of
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.full import FullScene
-from warmslip.verification.assumptions.corners import Corner, corner_exponents
 from warmslip.verification.assumptions.coupling import coupling
 from warmslip.verification.assumptions.findings import Finding, verdict
 from warmslip.verification.assumptions.friction import friction
@@ -38,7 +39,7 @@ def corners(d: Discretisation) -> Iterator[Finding]:
         meaning = "Edges and vertices of a body in space have exponents of their own, which are not computed."
         yield Finding("corners", "no corner slows convergence", (), "not needed", meaning)
         return
-    for corner in corner_exponents(d):
+    for corner in corners_of(d.scene, d.mesh):
         yield _corner(corner)
 
 

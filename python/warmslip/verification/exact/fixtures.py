@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from warmslip._core import Mesh2
 from warmslip.model.discretisation import discretise
 from warmslip.model.loads import Loads
 from warmslip.model.materials import mandel
@@ -14,12 +17,28 @@ from warmslip.scene.full import FullScene, build_full
 from warmslip.scene.material_tables import IsotropicTable
 from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
-from warmslip.verification.grading.meshes import Triangulation
 
 ROUND_OFF = 1e-11
 NORMALS = {"left": np.array([-1.0, 0.0]), "right": np.array([1.0, 0.0]), "top": np.array([0.0, 1.0])}
 
 _ZERO = [[0.0, 0.0], [0.0, 0.0]]
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """Nodes (n, 2), cells (c, 3) counterclockwise, and the edges (f, 2) of every boundary part."""
+
+    nodes: NDArray[np.float64]
+    cells: NDArray[np.int32]
+    parts: Mapping[str, NDArray[np.int32]]
+
+    @classmethod
+    def of(cls, mesh: Any) -> Triangulation:
+        return cls(np.asarray(mesh.nodes), np.asarray(mesh.cells), {k: np.asarray(v) for k, v in mesh.parts.items()})
+
+    def mesh(self) -> Any:
+        """As a `_core.Mesh2`."""
+        return Mesh2.from_lists(self.nodes, self.cells, dict(self.parts))
 
 
 def blank(**keys: Any) -> FullScene:

@@ -16,7 +16,6 @@ from warmslip.model.loads import Loads
 from warmslip.simulation.simulation import Simulation
 from warmslip.typing import Array
 from warmslip.verification.exact import fixtures
-from warmslip.verification.grading.meshes import Triangulation
 
 FORCE = 0.1  # P, per thickness
 PEAK = 2 * FORCE / np.pi  # Hertz's p_0 for a = 1
@@ -50,7 +49,7 @@ class HalfPlane:
         """R for which Hertz's a^2 = 4 P R/(pi E*) is 1."""
         return float(np.pi * self.modulus / (4 * FORCE))
 
-    def mesh(self) -> Triangulation:
+    def mesh(self) -> fixtures.Triangulation:
         """Uniform up to |x| = 1.25 and y = 1, from there in geometric progression; each doubling of `cells` halves all."""
         x, y = (_lines(start, self.size, self.cells) for start in (1.25, 1.0))
         return fixtures.crossed(np.concatenate([-x[:0:-1], x]), y)

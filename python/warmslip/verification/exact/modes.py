@@ -19,7 +19,6 @@ from warmslip.simulation.simulation import Simulation
 from warmslip.studies.rates import least_squares
 from warmslip.typing import Array
 from warmslip.verification.exact import fixtures
-from warmslip.verification.grading.meshes import Triangulation
 
 DENSITY, DAMPING, LAME, FAR = 1.7, 0.02, [1.5, 2.0], 10.0
 
@@ -33,7 +32,7 @@ def _scipy(matrix: Any) -> Any:
     return out
 
 
-def _job(mesh: Triangulation, lame: list[float], k: float, steps: int) -> Simulation:
+def _job(mesh: fixtures.Triangulation, lame: list[float], k: float, steps: int) -> Simulation:
     scene = fixtures.blank(
         time__end=k * steps,
         time__steps=steps,

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.records import check
 from warmslip.records.check import Check
 from warmslip.scene.full import FullScene

@@ -47,7 +47,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from warmslip.model.loads import evaluate
-from warmslip.model.materials import make_mesh
+from warmslip.model.meshes import make_mesh
 from warmslip.records import check
 from warmslip.records.check import Check
 from warmslip.scene.full import FullScene, full_model

@@ -3,71 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from warmslip.model.discretisation import Discretisation, discretise
-from warmslip.model.materials import make_mesh
 from warmslip.records.check import Check, below, order
 from warmslip.scene.full import FullScene
-from warmslip.simulation.statistics import BALANCES, residuals, worse
+from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.statistics import BALANCES
 from warmslip.studies import rates
 from warmslip.studies.error_norms import TERMS, Comparison, Largest
-from warmslip.verification.assumptions.corners import corner_exponents
-from warmslip.verification.grading.meshes import TimeBlock, Triangulation, family, time_blocks
-
-COARSEST = 4  # cells per side of the mesh that is refined; two graded corners must not share an edge
 
 
 @dataclass(frozen=True)
 class Grids:
-    """How the members of a study are graded: corners with their exponents, how often the first time block is halved, and
-    the largest k over h. Large steps let the errors in time be seen beside those in space."""
+    """How the members of a study are graded: keys of the scene, and k over h of the longest step."""
 
-    exponents: dict[tuple[float, float], float]
-    halvings: int
+    keys: dict[str, Any]
     ratio: int
 
-    def blocks(self, end: float, n: int) -> list[TimeBlock]:
-        """The time steps that go with h = 1/n; the last block is half of the time when there are several."""
-        return time_blocks(end, n // (self.ratio * (2 if self.halvings else 1)), self.halvings)
+    def member(self, scene: FullScene, n: int) -> FullScene:
+        """The scene with h = 1/n."""
+        return scene.override(**self.keys, **{"mesh.n": n, "time.steps": n // self.ratio})
 
 
-UNIFORM = Grids({}, 0, 1)
-
-
-class Member:
-    """A scene on one mesh, stepped through blocks of constant step size; operators are assembled once."""
-
-    def __init__(self, scene: FullScene, mesh: Any, blocks: list[TimeBlock]) -> None:
-        self.discretisation: Discretisation = discretise(scene, mesh=mesh)
-        self.blocks, self.stepper, self.steps = blocks, None, 0
-        self.worst = dict.fromkeys(BALANCES, 0.0)
-
-    def advance(self) -> Iterator[Any]:
-        """A report a step. Raises RuntimeError, with the outcome, when a step is rejected."""
-        d, loads = self.discretisation, self.discretisation.load_vectors
-        for block in self.blocks:
-            one = d.full.override(**{"time.end": block.k, "time.steps": 1})
-            stepper = replace(d, scene=one).stepper()
-            if self.stepper is not None:
-                state = self.stepper
-                stepper.start(state.u, state.w, state.theta, loads.on_points("gap", block.begin), block.begin)
-            self.stepper = stepper
-            for n in range(1, block.steps + 1):
-                report = stepper.advance(*loads.at(block.begin + n * block.k))
-                if report.outcome.name != "completed":
-                    raise RuntimeError(
-                        f"a step of size {block.k:g} at t = {stepper.time:g} ended: {report.outcome.name}"
-                    )
-                for name, value in residuals(report).items():
-                    self.worst[name] = worse(self.worst[name], value)
-                self.steps += 1
-                yield report
+# large steps let the errors in time be seen beside those in space
+GRADED = Grids({"mesh.graded_to": ["corners"], "time.graded_to": [0.0], "time.halvings": 8}, 4)
+UNIFORM = Grids({}, 1)
 
 
 def study(
@@ -80,31 +45,24 @@ def study(
     """Largest errors over the common times of members h = 1/n, k = ratio/n at most, against 1/reference; n = 8, 16, ...
 
     `e_TERM` is the distance to the reference, `gap_TERM` that to the next finer member, which has no bias: C h^p (1 - 2^-p).
-    Raises ValueError for fewer than three levels, a reference that is not finer than all of them, or a size that is not
-    COARSEST times a power of two; RuntimeError when a run is not completed.
+    Raises ValueError for fewer than three levels, a reference that is not finer than all of them, or a size that is no power
+    of two from 8 on; RuntimeError when a run is not completed.
     """
     sizes = [*sorted(levels), reference]
     if len(levels) < 3:
         raise ValueError(f"a study of {len(levels)} levels says nothing about an order; give at least three")
     if reference <= max(levels):
         raise ValueError(f"the reference 1/{reference} is not finer than the run 1/{max(levels)}; refine it")
-    doublings = [round(np.log2(n / COARSEST)) for n in sizes]
-    if min(sizes) < 2 * grids.ratio or any(COARSEST * 2**j != n for j, n in zip(doublings, sizes, strict=True)):
+    if min(sizes) < 8 or any(n & (n - 1) for n in sizes):
         raise ValueError(f"sizes must be 8, 16, 32, ...; got {sizes}")
-    coarsest = Triangulation.of(make_mesh(scene.override(**{"mesh.n": COARSEST})))
-    meshes = family(coarsest, grids.exponents, doublings[-1] + 1)
-
-    def member(n: int, doubling: int) -> Member:
-        return Member(scene, meshes[doubling].mesh(), grids.blocks(scene.time.end, n))
-
-    *runs, finest = [member(n, j) for n, j in zip(sizes, doublings, strict=True)]
+    *runs, finest = [Simulation(grids.member(scene, n)) for n in sizes]
     finer = [*runs[1:], finest]
     compare = [Comparison(run.discretisation, finest.discretisation) for run in runs]
     chain = [Comparison(run.discretisation, other.discretisation) for run, other in zip(runs, finer, strict=True)]
     largest, gaps = ([Largest() for _ in runs] for _ in range(2))
-    advancing = [run.advance() for run in runs]
-    total = sum(block.steps for block in finest.blocks)
-    for step, _ in enumerate(finest.advance(), 1):
+    advancing = [_advance(run) for run in runs]
+    total = finest.pace.expected
+    for step, _ in enumerate(_advance(finest), 1):
         for i in reversed(range(len(runs))):  # the finer ones first: each is compared with the next
             if step % (reference // sizes[i]) == 0:
                 next(advancing[i])
@@ -116,14 +74,21 @@ def study(
         {
             "n": n,
             "h": 1 / n,
-            "steps": run.steps,
+            "steps": run.taken,
             "cells": len(run.discretisation.mesh.cells),
             **{f"e_{term}": found.values[term] for term in TERMS},
             **{f"gap_{term}": gap.values[term] for term in TERMS},
-            **{f"residual_{name}": run.worst[name] for name in BALANCES},
+            **{f"residual_{name}": run.statistics.residuals[name] for name in BALANCES},
         }
         for n, run, found, gap in zip(sizes[:-1], runs, largest, gaps, strict=True)
     ]
+
+
+def _advance(run: Simulation) -> Iterator[Any]:
+    """The steps of a run. Raises RuntimeError, with the outcome, when one is rejected."""
+    yield from run.steps()
+    if run.outcome != "completed":
+        raise RuntimeError(f"a run ended at t = {run.stepper.time:g}: {run.outcome}")
 
 
 def unbiased(rows: list[dict[str, Any]], reference: int) -> list[dict[str, Any]]:
@@ -151,12 +116,6 @@ def unbiased(rows: list[dict[str, Any]], reference: int) -> list[dict[str, Any]]
             row[f"misfit_{term}"] = float(np.sqrt(np.mean(fit.fun**2)))
             row[f"order_{term}"] = rates.observed(true[i - 1], true[i]) if i else float("nan")
     return out
-
-
-def grids(scene: FullScene, halvings: int = 8) -> Grids:
-    """The grids that the singular corners and the start of a scene ask for, k = 4h."""
-    corners = corner_exponents(discretise(scene.override(**{"mesh.n": COARSEST})))
-    return Grids({corner.point: corner.exponent_u for corner in corners if corner.exponent_u < 1}, halvings, 4)
 
 
 def lines(name: str, scene: FullScene, graded: list[dict[str, Any]], uniform: list[dict[str, Any]]) -> list[Check]:

@@ -1,0 +1,163 @@
+#include "warmslip/time/step_systems.hpp"
+
+#include <algorithm>
+
+namespace warmslip {
+namespace {
+
+double largest_diagonal(Mat a) {
+  if (!a) return 0;
+  VecHandle diagonal;
+  PetscReal largest = 0;
+  WARMSLIP_PETSC(MatCreateVecs(a, diagonal.out(), nullptr));
+  WARMSLIP_PETSC(MatGetDiagonal(a, diagonal));
+  WARMSLIP_PETSC(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return largest;
+}
+
+// The largest of a quantity of the materials at every node of the mesh.
+template <int d, class Quantity>
+Eigen::VectorXd at_nodes(const Problem<d>& problem, Quantity&& quantity) {
+  const Mesh<d>& mesh = *problem.mesh;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(mesh.nodes.rows());
+  for (Index cell = 0; cell < mesh.cells.rows(); ++cell) {
+    const double here = quantity(problem.material(cell));
+    for (const Index node : mesh.cells.row(cell)) out[node] = std::max(out[node], here);
+  }
+  return out;
+}
+
+// The parts with a contact law, or all contact parts.
+template <int d>
+std::vector<std::string> parts_in_contact(const Problem<d>& problem, bool mechanical) {
+  std::vector<std::string> names;
+  for (const ContactPart& contact : problem.contacts)
+    if (contact.law || !mechanical) names.push_back(contact.part);
+  return names;
+}
+
+}  // namespace
+
+template <int d>
+StepSystems<d>::StepSystems(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                            const ContactSurface<d>& surface, double size, Coupling coupling, Backend backend,
+                            ContactOptions contact_options)
+    : k(size) {
+  if (!(k > 0) || !std::isfinite(k)) throw std::invalid_argument("the time step must be positive and finite");
+  const bool moves = problem.moves(), conducts = problem.conducts();
+  if (coupling == Coupling::monolithic && moves && conducts) {
+    if (problem.contact_heats())
+      throw std::invalid_argument("heat that the contact makes or conducts needs the staggered or the lagged coupling");
+    auto [scale, symmetry] = coupled_symmetry(problem);
+    coupled_scale = scale;
+    const MatHandle a = coupled_matrix(layout, problem, operators, k, scale);
+    factor_motion(layout, problem, operators, surface, a, d + 1, symmetry, "coupled", backend);
+  } else {
+    if (moves) {
+      const MatHandle a = momentum_matrix(layout, problem, operators, k);
+      factor_motion(layout, problem, operators, surface, a, d, Symmetry::positive_definite, "momentum", backend);
+    }
+    if (conducts) {
+      const MatHandle h = heat_matrix(operators, k);
+      // a capacity and an exchange that hold the constant temperature beside the conduction need no help
+      const double storing = largest_diagonal(operators.mass) / k + largest_diagonal(operators.exchange);
+      if (storing < 0.1 * largest_diagonal(operators.conductivity))
+        constants = RigidMotions(
+            layout, 1, 1, problem.prescribed_temperature, parts_in_contact(problem, false),
+            at_nodes(problem, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
+      if (!constants.empty()) constants.add_springs(h);
+      const auto apart = problem.contact_heats() ? surface.global_nodes() : std::vector<PetscInt>{};
+      heat = factor(h, apart, problem.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,
+                    "heat", backend);
+      if (!constants.empty())
+        constants.prepare(*heat, [&](Vec x, Vec y) {
+          if (operators.exchange) WARMSLIP_PETSC(MatMult(operators.exchange, x, y));
+          const VecHandle stored = duplicate(y);
+          WARMSLIP_PETSC(MatMult(operators.mass, x, stored));
+          WARMSLIP_PETSC(VecAXPY(y, 1 / k, stored));
+        });
+    }
+  }
+  if (surface.points() == 0) return;
+  // forces are shared in many ways, see ContactSolver::shared and minimal_forces
+  if (surface.shares()) contact_options.proximal = 1e-6;
+  RigidCoupling apart{Eigen::MatrixXd(surface.points() * d, rigid.count()), {}, rigid.inertia()};
+  apart.loads = carried = apart.motions;
+  for (Eigen::Index j = 0; j < rigid.count(); ++j) {
+    apart.motions.col(j) = surface.at_points(surface.nodal_values(rigid.along(j)));
+    apart.loads.col(j) = surface.at_points(surface.nodal_values(rigid.along_transposed(j)));
+    carried.col(j) = surface.at_points(surface.nodal_values(rigid.motion(j)));
+  }
+  contact =
+      std::make_unique<ContactSolver<d>>(surface.at_points(momentum->compliance()), contact_options, std::move(apart));
+}
+
+// Factors the operator of the motion, of `width` unknowns a node, with the rigid motions solved for apart.
+template <int d>
+void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
+                                   const ContactSurface<d>& surface, Mat a, int width, Symmetry symmetry,
+                                   const std::string& name, Backend backend) {
+  if (operators.elasticity || operators.viscosity)
+    rigid =
+        RigidMotions(layout, d, width, problem.prescribed_displacement, parts_in_contact(problem, true),
+                     at_nodes(problem, [&](const Material<d>& m) {
+                       return (m.elasticity ? k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
+                     }));
+  if (!rigid.empty()) rigid.add_springs(a);
+  momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
+  if (rigid.empty()) return;
+  rigid.prepare(*momentum, [&](Vec x, Vec y) {
+    multiply(operators.inertia, x, y);
+    WARMSLIP_PETSC(VecScale(y, 1 / k));
+  });
+  if (symmetry == Symmetry::definite_or_refused && !rigid.holds()) throw std::invalid_argument(indefinite_coupling);
+}
+
+template <int d>
+int StepSystems<d>::substitutions() const {
+  return (momentum ? momentum->substitutions() : 0) + (heat ? heat->substitutions() : 0);
+}
+
+template <int d>
+double StepSystems<d>::bytes() const {
+  return (momentum ? momentum->bytes() : 0) + (heat ? heat->bytes() : 0);
+}
+
+template <int d>
+double StepSystems<d>::flops() const {
+  return (momentum ? momentum->flops() : 0) + (heat ? heat->flops() : 0);
+}
+
+template <int d>
+std::shared_ptr<StepSystems<d>> SystemCache<d>::find(double k) {
+  const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one->k == k; });
+  if (found == kept_.end()) return nullptr;
+  std::rotate(found, found + 1, kept_.end());
+  return kept_.back();
+}
+
+template <int d>
+void SystemCache<d>::keep(std::shared_ptr<StepSystems<d>> systems) {
+  kept_.push_back(std::move(systems));
+  while (kept_.size() > 1 && layout_.sum(bytes()) > bound_) kept_.erase(kept_.begin());
+}
+
+template <int d>
+void SystemCache<d>::clear_contact_caches() {
+  for (const auto& systems : kept_)
+    if (systems->contact) systems->contact->clear_cache();
+}
+
+template <int d>
+double SystemCache<d>::bytes() const {
+  double sum = 0;
+  for (const auto& systems : kept_) sum += systems->bytes();
+  return sum;
+}
+
+template struct StepSystems<2>;
+template struct StepSystems<3>;
+template class SystemCache<2>;
+template class SystemCache<3>;
+
+}  // namespace warmslip

@@ -1,1 +1,0 @@
-"""Meshes and steps graded to where the solution is singular."""
