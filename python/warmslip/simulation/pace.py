@@ -92,7 +92,7 @@ class AdaptivePace:
     def expected(self) -> int:
         """Steps taken, and those that are left at the present size."""
         left = self._steps * 2**FLOOR - self.ticks
-        return self.taken + math.ceil(left * 2.0 ** (self.level - FLOOR))
+        return int(self.taken + math.ceil(left * 2.0 ** (self.level - FLOOR)))
 
     def next(self) -> Step | None:
         """The step to take, None at the end."""
