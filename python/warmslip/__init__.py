@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from warmslip.model.state import State
     from warmslip.simulation.run import Result, run
     from warmslip.simulation.simulation import Simulation
+    from warmslip.studies.sweep import sweep
 
 __all__ = [
     "Discretisation",
@@ -37,6 +38,7 @@ __all__ = [
     "discretise",
     "load",
     "run",
+    "sweep",
 ]
 
 __version__ = metadata.version("warmslip")
@@ -52,6 +54,7 @@ _LAZY = {
     "run": "simulation.run",
     "State": "model.state",
     "Trajectory": "io.trajectory",
+    "sweep": "studies.sweep",
 }
 
 

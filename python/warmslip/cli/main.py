@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from rich.logging import RichHandler
 
-from warmslip.cli import scene, study, verify
+from warmslip.cli import scene, study, sweep, verify
 from warmslip.cli.options import console
 from warmslip.scene.errors import SceneError
 from warmslip.simulation import ranks
@@ -54,6 +54,7 @@ PANELS: dict[str, tuple[tuple[str, Any], ...]] = {
         ("run", scene.run),
         ("view", scene.view),
         ("export", scene.export),
+        ("sweep", sweep.sweep),
     ),
     "Measure and verify": (
         ("study", study.study),

@@ -24,6 +24,7 @@ KINDS = {
     "mises": ("fields", "trajectories, a panel each"),
     "errors": ("convergence", "studies named READING_THETA_COUPLING.csv, a panel each"),
     "study": ("study", "any study, a panel each"),
+    "sweep": ("sweep", "the table of a sweep"),
     "corrected": ("convergence", "the table of rates, then studies it speaks of"),
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
     "table": ("maps", "the table of readings"),

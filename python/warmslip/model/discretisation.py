@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from warmslip.model.meshes import make_mesh
 from warmslip.model.prescribed import PrescribedContact
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
+from warmslip.scene.structure import structure
 from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
@@ -43,6 +45,32 @@ class Discretisation:
     laws: list[CheckedLaw]  # functions in the place of the scene's laws
     prescribed: PrescribedContact  # contact points that supports hold
     user_functions: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
+    like: Any = None  # a stepper whose factors are those of this scene too
+    known: dict[Any, Any] = field(default_factory=dict)  # what was found of mesh and operators, see `remember`
+
+    def remember(self, key: Any, find: Callable[[], Any]) -> Any:
+        """What `find` finds, kept under a `key` for this discretisation and those that share its operators."""
+        if key not in self.known:
+            self.known[key] = find()
+        return self.known[key]
+
+    def with_data(self, scene: Scene, stepper: Any, comm: Any) -> Discretisation:
+        """Another scene of the same `structure`, which shares mesh, operators and the factors of `stepper`.
+
+        Only one of the steppers that share factors may step at a time. Collective.
+
+        Raises
+        ------
+        ValueError
+            For a scene of another structure, or data that cannot be.
+        """
+        if structure(scene) != structure(self.scene) or self.user_functions:
+            raise ValueError("only scenes that differ in data alone share their operators; assemble this one")
+        posed = _posed(scene, self.mesh, None, None)
+        rules = self.load_vectors.rules
+        return _finished(
+            posed, self.mesh, self.layout, self.operators, self.surface, self.norms, comm, rules, stepper, self.known
+        )
 
     @property
     def dim(self) -> int:
@@ -66,16 +94,21 @@ class Discretisation:
         options = ContactOptions()
         if tolerance is not None:
             options.tolerance = tolerance
-        stepper = of_dim("Stepper", self.dim)(
-            self.layout,
-            self.problem,
-            self.operators,
-            self.surface,
-            k=scene.clock.step(1)[1],
-            coupling=getattr(Coupling, scene.time.coupling),
-            backend=getattr(Backend, backend),
-            contact=options,
-        )
+        kind = of_dim("Stepper", self.dim)
+        if self.like is not None:
+            stepper = kind(self.problem, like=self.like)
+            stepper.set_step(scene.clock.step(1)[1])
+        else:
+            stepper = kind(
+                self.layout,
+                self.problem,
+                self.operators,
+                self.surface,
+                k=scene.clock.step(1)[1],
+                coupling=getattr(Coupling, scene.time.coupling),
+                backend=getattr(Backend, backend),
+                contact=options,
+            )
         x, initial = np.asarray(self.mesh.nodes), scene.initial
 
         def start(name: str, components: int) -> Array:
@@ -239,16 +272,39 @@ def discretise(
 
     refuse_types(scene, loads, laws)
     comm = MPI.COMM_WORLD if comm is None else comm
-    d = scene.mesh.dim
-    given_loads = loads is not None
-    loads = loads or Loads.of(scene)
     mesh = make_mesh(scene) if mesh is None else mesh
+    posed = _posed(scene, mesh, loads, laws)
+    layout = of_dim("Layout", scene.mesh.dim)(comm, mesh)
+    surface = of_dim("ContactSurface", scene.mesh.dim)(layout, posed.problem)
+    held = {node for part in scene.supports.displacement for node in np.unique(mesh.parts[part])}
+    for contact in scene.contacts:
+        if contact.stiffness is not None and held.issuperset(np.unique(mesh.parts[contact.part])):
+            raise ValueError(
+                f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
+            )
+    operators = of_dim("Operators", scene.mesh.dim)(layout, posed.problem)
+    norms = of_dim("Norms", scene.mesh.dim)(layout)
+    return _finished(posed, mesh, layout, operators, surface, norms, comm, {})
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """A scene with its loads and laws, and the core's problem, before anything is assembled."""
+
+    scene: Scene
+    loads: Loads
+    problem: Any
+    laws: list[CheckedLaw]
+    user_functions: list[str]
+
+
+def _posed(scene: Scene, mesh: Any, loads: Loads | None, laws: dict[str, Law] | None) -> _Posed:
     watched = _checked(laws or {}, scene, mesh)
-    user_functions = ["loads"] * given_loads + [
+    user_functions = ["loads"] * (loads is not None) + [
         name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)
     ]
     given, regions = materials(scene, mesh)
-    problem = of_dim("Problem", d)(
+    problem = of_dim("Problem", scene.mesh.dim)(
         mesh=mesh,
         materials=given,
         regions=regions,
@@ -257,17 +313,29 @@ def discretise(
         contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
         lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
     )
-    layout = of_dim("Layout", d)(comm, mesh)
-    surface = of_dim("ContactSurface", d)(layout, problem)
-    held = {node for part in scene.supports.displacement for node in np.unique(mesh.parts[part])}
-    for contact in scene.contacts:
-        if contact.stiffness is not None and held.issuperset(np.unique(mesh.parts[contact.part])):
-            raise ValueError(
-                f"contact.part: every node of '{contact.part}' is clamped, there is nothing to touch; release one"
-            )
-    operators = of_dim("Operators", d)(layout, problem)
-    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference)
-    rigid = frozenset(part for part in laws or {} if f"laws.{part}.compliance" in user_functions)
+    return _Posed(scene, loads or Loads.of(scene), problem, list(watched.values()), user_functions)
+
+
+def _finished(
+    posed: _Posed,
+    mesh: Any,
+    layout: Any,
+    operators: Any,
+    surface: Any,
+    norms: Any,
+    comm: Any,
+    rules: dict[Any, Any],
+    like: Any = None,
+    known: dict[Any, Any] | None = None,
+) -> Discretisation:
+    """The discretisation of a scene whose operators are assembled. Raises ValueError for data that cannot be."""
+    scene, loads = posed.scene, posed.loads
+    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference, rules)
+    rigid = frozenset(
+        name.removeprefix("laws.").removesuffix(".compliance")
+        for name in posed.user_functions
+        if name.endswith(".compliance")
+    )
     prescribed = PrescribedContact(scene, mesh, surface, loads, vectors, rigid)
     if not prescribed.of_time and (why := prescribed.inside(0.0)):
         raise ValueError(f"supports.displacement: {why}")
@@ -275,15 +343,17 @@ def discretise(
         scene,
         loads,
         mesh,
-        problem,
+        posed.problem,
         layout,
         operators,
         surface,
-        of_dim("Norms", d)(layout),
+        norms,
         vectors,
-        list(watched.values()),
+        posed.laws,
         prescribed,
-        user_functions,
+        posed.user_functions,
+        like,
+        {} if known is None else known,
     )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from warmslip.model.coupling import coupled
+from warmslip.model.coupling import Coupled, coupled
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
@@ -30,12 +31,22 @@ def before(d: Discretisation) -> list[str]:
 def _coupling(d: Discretisation) -> list[str]:
     """A coupling that makes motion and temperature grow, where the tensors alone say so."""
     scheme, step = d.scene.time.coupling, d.scene.step  # the longest
-    found = coupled(d.problem.materials)
-    finest = (np.pi * float(np.linalg.norm(gradients(_corners(d)), axis=-1).max())) ** 2 if found else 0.0
+    found = coupled_materials(d)
+    finest = d.remember("finest", lambda: _finest(d)) if found else 0.0
     limits = [one.limit(scheme) for one in found if one.cancels and scheme == "staggered" and one.feeds(step, finest)]
     out = [plausibility.feeds(step, min(limits))] if limits else []
     itself = any(one.drives_itself(size(d)) for one in found if not one.cancels)
     return [*out, plausibility.drives_itself()] if itself else out
+
+
+def coupled_materials(d: Discretisation) -> list[Coupled]:
+    """The materials whose motion and heat act on each other."""
+    return list(d.remember("coupled", lambda: coupled(d.problem.materials)))
+
+
+def _finest(d: Discretisation) -> float:
+    """Square of the largest wave number that the mesh resolves, 1/area."""
+    return (np.pi * float(np.linalg.norm(gradients(_corners(d)), axis=-1).max())) ** 2
 
 
 def _gaps(d: Discretisation) -> list[str]:
@@ -80,7 +91,7 @@ def _starts(d: Discretisation) -> list[str]:
             continue
         if jump == 0:
             continue
-        height, capacity, conductivity = _first_cell(d, part)
+        height, capacity, conductivity = d.remember(("first cell", part), partial(_first_cell, d, part))
         if height == 0 or conductivity == 0:
             continue
         sensible = capacity * height**2 / (6 * conductivity)
@@ -96,7 +107,7 @@ def _starts(d: Discretisation) -> list[str]:
 
 def size(d: Discretisation) -> float:
     """Longest side of the body's box, length."""
-    return float(np.ptp(np.asarray(d.mesh.nodes), axis=0).max())
+    return float(d.remember("size", lambda: np.ptp(np.asarray(d.mesh.nodes), axis=0).max()))
 
 
 def _corners(d: Discretisation) -> Array:

@@ -62,11 +62,20 @@ class StepData:
 class LoadVectors:
     """The data of every step; what does not depend on time is assembled once.
 
-    `reference`, m(reference temperature, v) or None, is taken off the forces.
+    `reference`, m(reference temperature, v) or None, is taken off the forces. `rules` are quadrature rules by part and number of
+    points, of the same layout, to which those that lack are added.
     """
 
     def __init__(
-        self, scene: Scene, loads: Loads, mesh: Any, layout: Any, surface: Any, comm: Any, reference: Any = None
+        self,
+        scene: Scene,
+        loads: Loads,
+        mesh: Any,
+        layout: Any,
+        surface: Any,
+        comm: Any,
+        reference: Any = None,
+        rules: dict[tuple[str | None, int], Any] | None = None,
     ) -> None:
         dim = scene.mesh.dim
         _refuse_unused(scene, loads)
@@ -77,7 +86,7 @@ class LoadVectors:
         }
         moves, conducts = scene.moves, scene.heat is not None
         quadrature = LoadQuadrature2 if dim == 2 else LoadQuadrature3
-        rules: dict[tuple[str | None, int], Any] = {}
+        self.rules = rules = {} if rules is None else rules
 
         lumped = scene.heat is not None and scene.heat.capacity_matrix == "lumped"
 

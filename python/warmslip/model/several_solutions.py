@@ -108,6 +108,16 @@ def _coefficient(contact: ContactTable) -> float:
 
 
 def of_scene(d: Discretisation, stepper: Any, *, enough: float = math.inf, touching: Any | None = None) -> Finding:
+    """See `_find`; of the same contact laws, step size and points it is found once."""
+    laws = tuple(
+        (c.compliance, c.exponent, c.pressure_limit, c.friction.model_dump_json() if c.friction else "")
+        for c in d.scene.contacts
+    )
+    key = "solutions", laws, stepper.step, enough, None if touching is None else touching.tobytes()
+    return d.remember(key, lambda: _find(d, stepper, enough, touching))  # type: ignore[no-any-return]
+
+
+def _find(d: Discretisation, stepper: Any, enough: float, touching: Any | None) -> Finding:
     """What is known of the steps of a stepper; `enough` as in `bound`, `touching` (points,) those that bear a force at most.
 
     Tresca's constant bound leaves one solution and takes no part; a limit and a regularisation change nothing. A friction that

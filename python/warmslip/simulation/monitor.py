@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from warmslip.model import several_solutions
-from warmslip.model.coupling import coupled
 from warmslip.model.discretisation import Discretisation
-from warmslip.model.foresight import TIMES, before, size
+from warmslip.model.foresight import TIMES, before, coupled_materials, size
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
 from warmslip.scene import plausibility
@@ -65,8 +64,9 @@ class Monitor:
             "since": 0.0,
         }
         scheme = scene.time.coupling
-        both = coupled(self._d.problem.materials) if scene.moves and scene.heat is not None else []
+        both = coupled_materials(self._d) if scene.moves and scene.heat is not None else []
         self._coupled = [] if scheme == "monolithic" and all(one.cancels for one in both) else both
+        self._heat_weight = max((one.weight for one in self._coupled), default=0.0)
         self._driven = bool(self._coupled) and self._d.load_vectors.of_time
         self._given: list[float] = []  # norms of the data of the last step
 
@@ -99,7 +99,7 @@ class Monitor:
         """
         if step.size != self.seen["size"]:
             self.seen |= {"course": growth.start(), "size": step.size, "since": step.time - step.size}
-        heat = max(one.weight for one in self._coupled) * balances.heat_damping
+        heat = self._heat_weight * balances.heat_damping
         square = balances.inertia_damping + balances.elastic_damping + heat
         row = [growth.log(square), *self._changes(data)]
         if not growth.add(self.seen["course"], row) or not heat >= growth.HOT * square:
