@@ -7,6 +7,12 @@ std::unique_ptr<Factor> factor_with_cholmod(Mat, const std::vector<PetscInt>&, S
 #else
 #include <suitesparse/cholmod.h>
 
+// of the OpenMP library that CHOLMOD may be linked with
+extern "C" {
+__attribute__((weak)) int omp_get_max_active_levels();
+__attribute__((weak)) void omp_set_max_active_levels(int);
+}
+
 #include <algorithm>
 
 #include "warmslip/la/supernodal.hpp"
@@ -57,6 +63,21 @@ cholmod_sparse view(std::vector<int>& start, std::vector<int>& index, double* va
   return a;
 }
 
+// CHOLMOD asks for threads of its own, whatever OMP_NUM_THREADS says, and they wait by spinning: parallelism is by
+// processes here. While this lives, parallel regions of OpenMP are run by one thread.
+class OneThread {
+ public:
+  OneThread() : levels_(omp_get_max_active_levels ? omp_get_max_active_levels() : 0) { set(0); }
+  ~OneThread() { set(levels_); }
+  OneThread(const OneThread&) = delete;
+
+ private:
+  static void set(int levels) {
+    if (omp_set_max_active_levels) omp_set_max_active_levels(levels);
+  }
+  int levels_;
+};
+
 // CHOLMOD's own data and its factor, freed also when memory runs out on the way.
 struct Workspace : cholmod_common {
   Workspace() : cholmod_common{} { cholmod_start(this); }
@@ -73,6 +94,7 @@ using CholmodHandle = std::unique_ptr<cholmod_factor, Release>;
 class CholmodFactor final : public Factor {
  public:
   CholmodFactor(Mat k, const std::vector<PetscInt>& trailing, Symmetry symmetry, int block) {
+    const OneThread one_thread;
     common_.print = 0;
     Triangle triangle(k);
     const auto n = triangle.start.size() - 1;

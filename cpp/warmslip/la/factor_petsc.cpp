@@ -66,6 +66,11 @@ class PetscFactor final : public Factor {
     const auto n = static_cast<Eigen::Index>(trailing_.size());
     if (compliance_.rows() == n) return compliance_;
     compliance_.resize(n, n);
+    if (direct()) {
+      for (Eigen::Index first = 0; first < n; first += columns_at_once)
+        compliance_of(first, std::min(n - first, columns_at_once));
+      return compliance_;
+    }
     const VecHandle column = duplicate(free_);
     for (Eigen::Index j = 0; j < n; ++j) {
       add_load(Eigen::VectorXd::Unit(n, j));
@@ -97,6 +102,37 @@ class PetscFactor final : public Factor {
   }
 
  private:
+  static constexpr Eigen::Index columns_at_once = 64;
+
+  // Columns of the compliance by one pass over the factor.
+  void compliance_of(Eigen::Index first, Eigen::Index count) {
+    PetscInt begin, end;
+    WARMSLIP_PETSC(VecGetOwnershipRange(work_, &begin, &end));
+    MatHandle loads, velocities;
+    const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(KSP(ksp_)));
+    for (MatHandle* block : {&loads, &velocities})
+      WARMSLIP_PETSC(MatCreateDense(comm, end - begin, PETSC_DECIDE, PETSC_DETERMINE, static_cast<PetscInt>(count),
+                                    nullptr, block->out()));
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const PetscInt row = trailing_[static_cast<std::size_t>(first + j)];
+      if (row >= begin && row < end)
+        WARMSLIP_PETSC(MatSetValue(loads, row, static_cast<PetscInt>(j), 1, INSERT_VALUES));
+    }
+    for (const Mat block : {Mat(loads), Mat(velocities)}) {
+      WARMSLIP_PETSC(MatAssemblyBegin(block, MAT_FINAL_ASSEMBLY));
+      WARMSLIP_PETSC(MatAssemblyEnd(block, MAT_FINAL_ASSEMBLY));
+    }
+    WARMSLIP_PETSC(KSPMatSolve(ksp_, loads, velocities));
+    count_solve();
+    substitutions_ += static_cast<int>(count) - 1;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      Vec column;
+      WARMSLIP_PETSC(MatDenseGetColumnVecRead(velocities, static_cast<PetscInt>(j), &column));
+      compliance_.col(first + j) = held(column);
+      WARMSLIP_PETSC(MatDenseRestoreColumnVecRead(velocities, static_cast<PetscInt>(j), &column));
+    }
+  }
+
   int reason() const {
     KSPConvergedReason reason;
     WARMSLIP_PETSC(KSPGetConvergedReason(ksp_, &reason));

@@ -49,10 +49,20 @@ inline __attribute__((always_inline)) double dot(const double* __restrict a, con
 Panels::Panels(std::size_t n, const int* start, const int* count, const int* index, const double* value)
     : inverse_pivots_(n) {
   int longest = 0;
-  for (std::size_t first = 0; first < n;) {
+  const auto end_of = [&](std::size_t first) {
     std::size_t end = first + 1;
     // column j+1 continues the panel when it is the first row of column j and has every other row of it
     while (end < n && count[end] == count[end - 1] - 1 && index[start[end - 1] + 1] == static_cast<int>(end)) ++end;
+    return end;
+  };
+  std::size_t entries_below = 0, rows_below = 0;  // growing to them by insertion would take twice their room
+  for (std::size_t j = 0; j < n; ++j) entries_below += static_cast<std::size_t>(count[j] - 1);
+  for (std::size_t first = 0; first < n; first = end_of(first))
+    rows_below += static_cast<std::size_t>(count[end_of(first) - 1] - 1);
+  values_.reserve(entries_below);
+  rows_.reserve(rows_below);
+  for (std::size_t first = 0; first < n;) {
+    const std::size_t end = end_of(first);
     const int width = static_cast<int>(end - first), below = count[end - 1] - 1;
     panels_.push_back({static_cast<int>(first), width, below, rows_.size(), values_.size()});
     const int* last = index + start[end - 1] + 1;
@@ -69,8 +79,6 @@ Panels::Panels(std::size_t n, const int* start, const int* count, const int* ind
     longest = std::max(longest, below);
     first = end;
   }
-  rows_.shrink_to_fit();
-  values_.shrink_to_fit();
   work_.resize(static_cast<std::size_t>(longest));
 }
 

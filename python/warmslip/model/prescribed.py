@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+
 
 from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, of_time
@@ -83,6 +83,8 @@ class PrescribedContact:
 
 
 def _at_nodes(points: Any, places: Array, nodes: Array, held: Any) -> Iterator[tuple[int, Any, Array]]:
+    from scipy.spatial import cKDTree  # a tenth of a second, for few scenes
+
     distance, found = cKDTree(nodes[held]).query(places)
     for point, away, node in zip(points, distance, held[found], strict=True):
         if away <= ROUNDING * np.ptp(nodes, axis=0).max():
@@ -90,6 +92,8 @@ def _at_nodes(points: Any, places: Array, nodes: Array, held: Any) -> Iterator[t
 
 
 def _on_facets(points: Any, places: Array, nodes: Array, facets: Any) -> Iterator[tuple[int, Any, Array]]:
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(places)
     for facet in facets:
         corners = nodes[facet]

@@ -87,6 +87,8 @@ HOLDS: dict[str, list[int]] = {  # which of those a key can hold
     "contact": [3],
     "supports.displacement": [3],
     "supports.temperature": [3],
+    "mesh.graded_to": [3],
+    "time.graded_to": [3],
     "heat.heating.thermodynamic": [0],
 }
 SIGNED = (
