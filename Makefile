@@ -1,7 +1,7 @@
 # The commands of the project; `make help` lists them.
 .DEFAULT_GOAL := help
 SHELL := bash
-.PHONY: help setup reproduce test verify coverage asan fused fuzz bench mutants lint docs extremes envelope wheel
+.PHONY: help setup reproduce test verify trade coverage asan fused fuzz bench mutants lint docs extremes envelope wheel
 ARGS ?=
 env := . workflows/env.sh &&
 
@@ -19,6 +19,9 @@ test:  ## all C++ and Python tests (ARGS go to pytest)
 
 verify: setup  ## every proof of the numbers into results/verification (ARGS go to snakemake)
 	@$(env) snakemake -s workflows/verify/Snakefile --quiet host reason $(ARGS)
+
+trade: setup  ## what accuracy costs: every method against an independent reference, into results/tradeoff (ARGS go to snakemake)
+	@$(env) snakemake -s workflows/trade/Snakefile --quiet host reason $(ARGS)
 
 coverage: setup  ## lines and branches of the C++ core that the fast tests reach (ARGS go to pytest)
 	@bash tests/coverage.sh $(ARGS)

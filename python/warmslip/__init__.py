@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from warmslip.model.discretisation import Discretisation, discretise
     from warmslip.model.loads import Loads
     from warmslip.model.state import State
-    from warmslip.simulation.run import Result, run
+    from warmslip.simulation.run import Result
     from warmslip.simulation.simulation import Simulation
+    from warmslip.studies.accuracy import run
     from warmslip.studies.sweep import sweep
 
 __all__ = [
@@ -51,7 +52,7 @@ _LAZY = {
     "discretise": "model.discretisation",
     "Result": "simulation.run",
     "Simulation": "simulation.simulation",
-    "run": "simulation.run",
+    "run": "studies.accuracy",
     "State": "model.state",
     "Trajectory": "io.trajectory",
     "sweep": "studies.sweep",

@@ -25,6 +25,14 @@ def run(
     backend: Annotated[str, typer.Option(help="automatic, cholmod or petsc")] = "automatic",
     resume: Annotated[bool, typer.Option("--resume", help="go on from the newest checkpoint in the folder")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="check and explain the scene, write nothing")] = False,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="also estimate the errors from coarser companions: three times the cost")
+    ] = False,
+    error: Annotated[
+        str, typer.Option(help="relative error, such as 1%: mesh, grading and steps are chosen for it from pilot runs")
+    ] = "",
+    of: Annotated[str, typer.Option(help="what --error is of: all, u_V, w_L2, theta_L2, normal_force ...")] = "all",
+    seconds: Annotated[float, typer.Option(help="CPU seconds that a run with --error may take")] = 3600.0,
     petsc: Annotated[
         str, typer.Option(help='PETSc options, such as "-log_view -momentum_ksp_type cg"; see also PETSC_OPTIONS')
     ] = "",
@@ -37,6 +45,14 @@ def run(
         return
     checked = reader.load(scene, set_)
     _refuse_dashless(petsc)
+    wanted = relative(error) if error else None
+    if wanted is not None and (resume or estimate):
+        raise SceneError("--error chooses a new run and estimates its error; leave --resume and --estimate out")
+    if estimate:
+        from warmslip.studies.companions import coarser, slower
+
+        for one in (coarser(checked, 2), slower(checked, 2)):  # before the run: a mesh and steps that can be halved
+            assert one
     if petsc:  # read once, when PETSc starts; it says at the end which of them nothing has used
         os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} {petsc} -options_left"
     from mpi4py import MPI
@@ -45,6 +61,12 @@ def run(
     from warmslip.simulation.run import run
 
     rank = MPI.COMM_WORLD.rank
+    answer = None
+    if wanted is not None:
+        from warmslip.studies import ask
+
+        answer = ask.solve(checked, wanted, of, seconds=seconds, say=_say if rank == 0 else lambda _: None)
+        checked = answer.scene
     for odd in plan.plan(checked).suspicious if rank == 0 else ():
         console.print(f"note: {odd}", highlight=False, soft_wrap=True, markup=False)
     with progress_bar(rank) as bar:
@@ -56,12 +78,86 @@ def run(
             )
 
         result = run(checked, out=out, backend=backend, progress=progress, resume=resume)
+    if answer is not None:
+        _tell_error(result, answer, wanted, out, rank)
+    if estimate and result.completed:
+        _estimate(checked, out, rank)
     if rank == 0:
         typer.echo(f"{result.outcome}: {_ending(result.summary)}, see {out}/summary.json")
         for sentence in result.summary["warnings"]:
             console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
     if not result.completed:
         sys.exit(130 if result.outcome == "interrupted" else 1)  # it has given the reason
+
+
+def relative(text: str) -> float:
+    """A relative error, given as a number or in percent. Raises SceneError."""
+    number, percent, rest = text.strip().partition("%")
+    try:
+        value = float(number) / (100 if percent else 1)
+    except ValueError:
+        value = float("nan")
+    if rest or not 0 < value < 1:
+        raise SceneError(f"--error '{text}' is no relative error; write 1% or 0.01")
+    return value
+
+
+def _say(line: str) -> None:
+    console.print(line, highlight=False, soft_wrap=True, markup=False)
+
+
+def _tell_error(result: Any, answer: Any, wanted: Any, out: Path, rank: int) -> None:
+    """What a run with --error has come to; into its summary too."""
+    from warmslip.studies.accuracy import with_error
+
+    if rank == 0:
+        with_error(result, answer, wanted, out)
+        parts = "; ".join(
+            f"{name} {100 * sum(one.values()):.2g} % (mesh {100 * one['space']:.2g} %, steps {100 * one['time']:.2g} %)"
+            for name, one in answer.parts.items()
+        )
+        typer.echo(
+            f"estimated error {100 * answer.error:.2g} %: {parts}; {answer.seconds:.3g} s of CPU with the pilot runs"
+        )
+
+
+def _estimate(scene: Scene, out: Path, rank: int) -> None:
+    """Estimates the errors of a run that was completed: a table, a figure and lines on the terminal."""
+    from warmslip.figures import draw
+    from warmslip.records import tables
+    from warmslip.studies import error_estimate
+    from warmslip.studies.refinement_study import stamp
+
+    with progress_bar(rank) as bar:
+        task = bar.add_task("companions", total=scene.time.end, note="")
+        found, _ = error_estimate.estimate(scene, lambda time, _: bar.update(task, completed=time))
+    if rank == 0:
+        tables.write(out / "error.csv", found.rows(), stamp(scene))
+        draw("error", [out / "error.csv"], out / "error.png")
+        typer.echo(error_estimate.text(found))
+
+
+def plan_(
+    scene: SceneName,
+    error: Annotated[str, typer.Option(help="relative error that is asked for, such as 1%")],
+    set_: Set = None,
+    of: Annotated[str, typer.Option(help="all, u_V, w_L2, theta_L2, normal_force ...")] = "all",
+    seconds: Annotated[float, typer.Option(help="CPU seconds that the run may take")] = 3600.0,
+) -> None:
+    """Choose mesh, grading and steps for an error: the choice, what it will cost, and the alternatives."""
+    from mpi4py import MPI
+
+    from warmslip.studies import ask
+
+    checked = reader.load(scene, set_)
+    first = MPI.COMM_WORLD.rank == 0
+    found = ask.plan(checked, relative(error), of, seconds=seconds, say=_say if first else lambda _: None)
+    if first:
+        typer.echo(ask.text(found))
+        typer.echo(
+            f"run it with: warmslip run {scene} "
+            + " ".join(f'--set "{key}"' for key in ask.keys_of(found.choice.scene))
+        )
 
 
 def _refuse_dashless(petsc: str) -> None:

@@ -225,3 +225,19 @@ def draw(
     import warmslip.figures as figures
 
     figures.draw(kind, inputs, out)
+
+
+def trade(
+    contest: Annotated[str, typer.Argument(help="paper_cold, paper_hot, heat, impact, stick_slip or block")],
+    out: Csv,
+) -> None:
+    """Measure what accuracy costs: every method on a scene, against one reference that no method shares."""
+    from warmslip.studies import tradeoff
+
+    if contest not in tradeoff.CONTESTS:
+        raise SceneError(f"there is no contest '{contest}'; give one of {', '.join(tradeoff.CONTESTS)}")
+    rows = tradeoff.run(tradeoff.CONTESTS[contest], lambda line: typer.echo(line, err=True))
+    from warmslip.studies.refinement_study import stamp
+
+    tables.write(_writable(out), rows, stamp(None, contest=contest))
+    typer.echo(f"{len(rows)} runs in {out}")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-
 from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, of_time
 from warmslip.scene.scene import Scene

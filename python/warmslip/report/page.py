@@ -14,6 +14,7 @@ import tomli_w
 
 from warmslip.figures import run as drawings
 from warmslip.figures import style
+from warmslip.figures.error import error as error_bars
 from warmslip.figures.run import Array, Body
 from warmslip.io.paraview import contact_at, opened, state_number
 from warmslip.io.trajectory import Trajectory
@@ -57,6 +58,8 @@ def view(
             found["contact"] = drawings.contact(parts, last.time)
         if len(t.series("steps")["time"]):
             found["history"] = drawings.history(t.series("steps")["time"], _history(t, d))
+        if (Path(run) / "error.csv").exists():
+            found["error"] = error_bars([Path(run) / "error.csv"])
         files = []
         for name, (figure, caption) in found.items():
             style.save(figure, caption, folder / f"{name}.png")

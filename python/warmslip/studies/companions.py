@@ -1,10 +1,11 @@
 """Runs of one scene on several meshes and clocks that advance together, and how far they are from each other.
 
-Nothing is stored: two runs are compared at each time that both reach. Meshes must be nested.
+Nothing is stored: two runs are compared at each time that both reach.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -16,6 +17,7 @@ from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.error_norms import TERMS, Comparison
+from warmslip.studies.point_values import PointComparison
 
 FUNCTIONALS = ("normal_force", "tangential_force", "largest_pressure", "dissipated_energy", "theta_max", "theta_mean")
 QUANTITIES = (*TERMS, *FUNCTIONALS)
@@ -33,7 +35,9 @@ class Companion:
         self._weights = np.asarray(self.simulation.discretisation.surface.weights)
         self._normals = np.asarray(self.simulation.discretisation.surface.normals)
         self.values = dict.fromkeys(FUNCTIONALS, 0.0)
-        self.seconds = 0.0
+        self._factoring = float(self.simulation.stepper.cost.setup_seconds)
+        self._stepping = 0.0
+        self.seconds = 0.0  # CPU, of the first factorization and of the steps
 
     @property
     def next_time(self) -> float:
@@ -41,15 +45,22 @@ class Companion:
         ahead = self.simulation.pace.next()
         return np.inf if ahead is None else ahead.time
 
+    @property
+    def time(self) -> float:
+        """The present time."""
+        return float(self.simulation.stepper.time)
+
     def advance(self) -> None:
         """One step. Raises RuntimeError, naming the run, when it is rejected."""
+        began = time.process_time()
         done = next(self._steps, None)
+        self._stepping += time.process_time() - began
         s = self.simulation
         if done is None:
-            level, time = self.scene.mesh.level, self.scene.time
+            level, clock = self.scene.mesh.level, self.scene.time
             why = f": {s.failure['reason']}" if s.failure and s.failure["reason"] else ""
             raise RuntimeError(
-                f"the run with n = {level}, steps = {time.steps} ended at t = {s.stepper.time:g} with {s.outcome}{why}"
+                f"the run with n = {level}, steps = {clock.steps} ended at t = {s.stepper.time:g} with {s.outcome}{why}"
             )
         report = done[1]
         balances = report.balances
@@ -67,7 +78,7 @@ class Companion:
             values["theta_max"] = float(stepper.theta.max()[1])
             values["theta_mean"] = self._mean()
         self.values = {name: values.get(name, 0.0) for name in FUNCTIONALS}
-        self.seconds = stepper.cost.setup_seconds + stepper.cost.step_seconds
+        self.seconds = self._factoring + self._stepping
 
     def _mean(self) -> float:
         """Mean temperature of the body."""
@@ -107,6 +118,8 @@ def march(
     runs: Sequence[Companion],
     pairs: Sequence[tuple[int, int]],
     progress: Callable[[float, float], None] | None = None,
+    *,
+    nested: bool = True,
 ) -> tuple[list[Distance], dict[str, float]]:
     """Advances runs to their end together (collective).
 
@@ -115,9 +128,11 @@ def march(
     runs : sequence of Companion
         All have the same end.
     pairs : sequence of (int, int)
-        Which two to compare; the mesh of the first one contains that of the second.
+        Which two to compare, the finer one first.
     progress : callable, optional
         Called as ``progress(time, end)``.
+    nested : bool
+        Whether the mesh of the first one of a pair is a refinement of the other's: distances are exact then.
 
     Returns
     -------
@@ -133,13 +148,16 @@ def march(
     """
     distances = [Distance() for _ in pairs]
     comparisons = [
-        Comparison(runs[coarse].simulation.discretisation, runs[fine].simulation.discretisation)
+        (Comparison if nested else PointComparison)(
+            runs[coarse].simulation.discretisation, runs[fine].simulation.discretisation
+        )
         for fine, coarse in pairs
     ]
     largest = dict.fromkeys(QUANTITIES, 0.0)
     end = runs[0].scene.time.end
-    while (time := min(run.next_time for run in runs)) < np.inf:
-        moved = [run for run in runs if run.next_time <= time + SAME_TIME * end]
+    while (ahead := min(run.next_time for run in runs)) < np.inf:
+        # a step that is taken back ends earlier than was announced; the others then wait until its run has come to their time
+        moved = [run for run in runs if run.next_time <= ahead + SAME_TIME * end]
         for run in moved:
             run.advance()
         if runs[0] in moved:
@@ -147,11 +165,11 @@ def march(
             largest = {name: max(value, abs(found[name])) for name, value in largest.items()}
         for distance, comparison, (fine, coarse) in zip(distances, comparisons, pairs, strict=True):
             one, other = runs[fine], runs[coarse]
-            if one in moved and other in moved:
+            if (one in moved or other in moved) and abs(one.time - other.time) <= SAME_TIME * end:
                 gaps = comparison.difference(other.simulation.stepper, one.simulation.stepper)
                 distance.add(gaps | {name: abs(one.values[name] - other.values[name]) for name in FUNCTIONALS})
         if progress:
-            progress(time, end)
+            progress(ahead, end)
     return distances, largest
 
 
@@ -166,9 +184,7 @@ def coarser(scene: Scene, times: int = 1) -> Scene:
         return scene.override(**{"mesh.refine": table.refine - times})
     divisor = 2**times
     counts = table.counts
-    if any(count % divisor or count < 2 * divisor for count in counts) or (
-        table.graded_to and table.halvings <= times
-    ):
+    if any(count % divisor or count < 2 * divisor for count in counts) or (table.graded_to and table.halvings <= times):
         least = [max(2 * divisor, divisor * round(count / divisor)) for count in counts]
         n = least[0] if len(set(least)) == 1 else least
         more = f" or {8 * divisor} at least" if table.graded_to else ""

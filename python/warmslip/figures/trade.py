@@ -1,0 +1,79 @@
+"""What accuracy costs: errors of every method over CPU seconds, memory and work, one curve a method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, grid_lines, number
+from warmslip.records import tables
+
+LOOKS = {
+    "equal steps": (INK, "o"),
+    "equal steps, lagged": (GREY, "x"),
+    "equal steps, monolithic": (PURPLE, "s"),
+    "equal steps, gauss-2": (SKY, "D"),
+    "graded steps": (ORANGE, "^"),
+    "adaptive steps": (GREEN, "v"),
+    "graded mesh": (GREY, "d"),
+    "graded mesh and steps": (VERMILLION, "^"),
+    "graded mesh, adaptive steps": (BLUE, "v"),
+}
+ERRORS = {
+    "e_sum": "sum of the norms",
+    "e_u_V": r"$|u|_V$",
+    "e_theta_L2": r"$|\theta|_{L^2}$",
+    "e_normal_force": "normal force",
+}
+
+
+def trade(inputs: list[Path]) -> tuple[Figure, str]:
+    """Errors over CPU seconds, a panel a quantity; dashed: the estimated error of the reference."""
+    found = {path.stem: tables.read(path) for path in inputs}
+    shown = {name: [key for key in ERRORS if any(row[key] > 0 for row in rows)] for name, rows in found.items()}
+    columns = max(len(keys) for keys in shown.values())
+    figure, axes = plt.subplots(len(found), columns, figsize=(3.3 * columns, 2.9 * len(found)), squeeze=False)
+    captions, handles = [], {}
+    for line, (name, rows) in zip(axes, found.items(), strict=True):
+        for ax in line[len(shown[name]) :]:
+            ax.set_visible(False)
+        for ax, key in zip(line, shown[name], strict=False):
+            handles |= _panel(ax, rows, key)
+            ax.set_title(f"{name.replace('_', ' ')}: {ERRORS[key]}", fontsize=9)
+        line[0].set_ylabel("largest error over time")
+        captions.append(_best(name, rows))
+    for ax in axes[-1]:
+        ax.set_xlabel("CPU seconds")
+    figure.legend(handles.values(), handles.keys(), ncol=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1))
+    return figure, " ".join(captions)
+
+
+def _panel(ax: Any, rows: list[tables.Row], key: str) -> dict[str, Any]:
+    handles = {}
+    for method, (colour, marker) in LOOKS.items():
+        own = [row for row in rows if row["method"] == method and row[key] > 0]
+        if own:
+            x, y = [row["cpu_seconds"] for row in own], [row[key] for row in own]
+            (handles[method],) = ax.loglog(x, y, color=colour, marker=marker, mec="white", mew=0.4, lw=1.2)
+    half = next(row for row in rows if row["method"] == "reference, half")
+    if half[key] > 0:  # of order one: what the reference errs is about its distance to its half
+        ax.axhline(half[key], color=GREY, lw=0.8, ls=(0, (4, 3)))
+    grid_lines(ax)
+    return handles
+
+
+def _best(name: str, rows: list[tables.Row]) -> str:
+    """How much cheaper than the finest run with equal steps the error of that run can be had."""
+    equal = [row for row in rows if row["method"] == "equal steps"]
+    finest = max(equal, key=lambda row: row["n"])
+    others = [row for row in rows if row["method"] in LOOKS and row["e_sum"] <= finest["e_sum"]]
+    best = min(others, key=lambda row: row["cpu_seconds"])
+    gain = finest["cpu_seconds"] / best["cpu_seconds"]
+    return (
+        f"{name.replace('_', ' ')}: the error {number(finest['e_sum'])} of equal steps with n = {finest['n']} "
+        f"({number(finest['cpu_seconds'])} s) is had by {best['method']} with n = {best['n']} in "
+        f"{number(best['cpu_seconds'])} s, {number(gain)} times quicker."
+    )
