@@ -36,7 +36,8 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
     shown = {name: [key for key in ERRORS if any(row[key] > 0 for row in rows)] for name, rows in found.items()}
     columns = max(len(keys) for keys in shown.values())
     figure, axes = plt.subplots(len(found), columns, figsize=(3.3 * columns, 2.9 * len(found)), squeeze=False)
-    captions, handles = [], {}
+    captions: list[str] = []
+    handles: dict[str, Any] = {}
     for line, (name, rows) in zip(axes, found.items(), strict=True):
         for ax in line[len(shown[name]) :]:
             ax.set_visible(False)
@@ -47,7 +48,7 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
         captions.append(_best(name, rows))
     for ax in axes[-1]:
         ax.set_xlabel("CPU seconds")
-    figure.legend(handles.values(), handles.keys(), ncol=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1))
+    figure.legend(list(handles.values()), list(handles), ncol=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1))
     return figure, " ".join(captions)
 
 
