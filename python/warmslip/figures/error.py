@@ -47,7 +47,7 @@ def error(inputs: list[Path]) -> tuple[Figure, str]:
     ax.set_yticks(range(len(quantities)), [NAMES.get(name, name.replace("_", " ")) for name in quantities])
     ax.invert_yaxis()
     grid_lines(ax)
-    figure.legend(*ax.get_legend_handles_labels(), ncol=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1))
+    figure.legend(*ax.get_legend_handles_labels(), ncol=3, fontsize=8, loc="outside upper center")
     totals = "; ".join(
         f"{name.replace('_', ' ')} {number(100 * sum(relative.get((name, part), 0) for part in ('space', 'time')))} %"
         for name in quantities

@@ -44,9 +44,7 @@ def sweep(inputs: list[Path]) -> tuple[Figure, str]:
         _panel(ax, name, first, others, dict(list(curves.items())[:MOST]), colours)
     if others:
         handles = axes[0, 0].get_legend_handles_labels()
-        figure.legend(
-            *handles, ncol=MOST, fontsize=8, title=", ".join(others), loc="lower center", bbox_to_anchor=(0.5, 1)
-        )
+        figure.legend(*handles, ncol=MOST, fontsize=8, title=", ".join(others), loc="outside upper center")
     stopped = sum(row["outcome"] != "completed" for row in rows)
     ranges = "; ".join(
         f"{PANELS[name]} {number(min(row[name] for row in rows))} to {number(max(row[name] for row in rows))}"

@@ -48,7 +48,7 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
         captions.append(_best(name, rows))
     for ax in axes[-1]:
         ax.set_xlabel("CPU seconds")
-    figure.legend(list(handles.values()), list(handles), ncol=3, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1))
+    figure.legend(list(handles.values()), list(handles), ncol=3, fontsize=8, loc="outside upper center")
     return figure, " ".join(captions)
 
 

@@ -71,15 +71,16 @@ class Contest:
     ratio: int = 1
     graded: bool = True
 
-    def at(self, method: str, n: int) -> Scene:
-        """The scene of a method and a level."""
+    def at(self, method: str, n: int, finer: int = 1) -> Scene:
+        """The scene of a method and a level, with so many times the steps."""
         scene = load(self.scene).override(**self.keys)
         unit = [count // min(scene.mesh.counts) for count in scene.mesh.counts]
-        keys = METHODS[method](n, self.ratio * n)
+        keys = METHODS[method](n, finer * self.ratio * n)
         return scene.override(**(keys | {"mesh.n": [one * n for one in unit]}))
 
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
+FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
     "paper_cold": Contest("paper_mixed", {}, list(METHODS), [8, 16, 32, 64, 128], 256),
     "paper_hot": Contest("paper_mixed", HOT, list(METHODS), [8, 16, 32, 64, 128], 256),
@@ -119,7 +120,7 @@ def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[R
     kind = "graded mesh and steps" if contest.graded else "equal steps"
     if contest.graded and "graded mesh and steps" not in contest.methods:
         kind = "graded steps"
-    references = [contest.at(kind, n) for n in (contest.reference, contest.reference // 2)]
+    references = [contest.at(kind, n, FINER) for n in (contest.reference, contest.reference // 2)]
     finest = Companion(references[0])
     rows: list[Row] = []
     entries: list[tuple[str, int, Companion]] = [("reference, half", contest.reference // 2, Companion(references[1]))]
