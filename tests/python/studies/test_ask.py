@@ -1,0 +1,131 @@
+"""Errors that are asked for: the answer has them, the choice is the cheap one, what cannot be had is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.processes import Command
+
+import warmslip
+from warmslip import SceneError
+from warmslip.scene.scene import Scene
+from warmslip.studies import ask
+from warmslip.studies.companions import Companion, march
+
+HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
+FLAT = {
+    "mesh": {"n": 4},
+    "time": {"end": 1.0, "steps": 4},
+    "heat": {"conductivity": 1.0},
+    "supports": {"temperature": ["top"]},
+}
+SMOOTH = Scene.model_validate(FLAT | {"heat": {"conductivity": 1.0, "source": "t * sin(3.14159265 * x)"}})
+CASES: dict[str, tuple[Scene, float, str]] = {
+    "paper": (warmslip.load("paper_mixed").override(**HOT), 0.1, "all"),
+    "mean temperature": (warmslip.load("heat_slab"), 0.02, "theta_mean"),
+    "smooth": (SMOOTH, 0.01, "theta_L2"),
+    "file": (warmslip.load("plate_with_hole"), 0.1, "all"),
+    "space": (warmslip.load("block_3d").override(**HOT), 0.1, "theta_L2"),
+}
+
+
+def true_error(one: Scene, quantities: list[str]) -> float:
+    """Against twice the cells and four times the steps, whose own error is a part of it."""
+    table, time = one.mesh, one.time
+    finer: dict[str, Any] = (
+        {"mesh.refine": table.refine + 1} if table.file else {"mesh.n": [2 * n for n in table.counts]}
+    )
+    finer |= {"time.steps": 4 * time.steps} if time.tolerance is None else {"time.tolerance": time.tolerance / 16}
+    fine, run = Companion(one.override(**finer)), Companion(one)
+    (distance,), size = march([fine, run], [(0, 1)])
+    return max(distance.values[name] / size[name] for name in quantities)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_error_is_what_was_asked_for(case: str) -> None:
+    scene, error, of = CASES[case]
+    answer = ask.solve(scene, error, of, seconds=20.0)
+    assert answer.error <= error
+    assert answer.simulation.outcome == "completed"
+    assert true_error(answer.scene, answer.plan.quantities) <= error
+    assert len(answer.tries) <= ask.TRIES
+    assert answer.seconds >= answer.plan.pilot_seconds > 0
+
+
+def test_singular_corners_ask_for_a_graded_mesh() -> None:
+    scene = warmslip.load("paper_mixed")
+    found = ask.plan(scene, 0.03, "u_V", seconds=60.0)
+    assert found.choice.setting.mesh == "graded"
+    assert found.orders["uniform mesh"]["u_V"] < found.orders["graded mesh"]["u_V"]
+    kinds = {(one.setting.mesh, one.setting.steps) for one in [found.choice, *found.alternatives]}
+    assert len(kinds) == 6
+    assert all(one.seconds >= found.choice.seconds for one in found.alternatives if one.met)
+    text = ask.text(found)
+    assert "graded to the singular corners" in text and "alternatives" in text
+    again = scene.override(
+        **{key: value for key, value in found.choice.scene.model_dump(mode="json")["mesh"].items() if False}
+    )
+    assert again == scene
+
+
+def test_no_grading_without_a_singular_corner() -> None:
+    found = ask.plan(SMOOTH, 0.02, "theta_L2")
+    assert {one.setting.mesh for one in [found.choice, *found.alternatives]} == {"uniform"}
+
+
+def test_a_smaller_error_costs_more() -> None:
+    loose, tight = (ask.plan(warmslip.load("heat_slab"), error, "theta_L2").choice for error in (0.05, 0.005))
+    assert tight.seconds > loose.seconds
+    assert tight.error <= 0.005 / ask.SAFETY
+
+
+@pytest.mark.parametrize(
+    ("error", "of", "seconds", "message"),
+    [
+        (0.0, "all", 10.0, "no relative error"),
+        (2.0, "all", 10.0, "no relative error"),
+        (1e-13, "all", 10.0, "rounding"),
+        (0.01, "pressure", 10.0, "unknown; give all"),
+        (0.01, "theta_L2", 10.0, "no such quantity"),
+        (1e-6, "u_V", 0.5, "cannot be had in 0.5 s; the best is"),
+    ],
+)
+def test_refusals(error: float, of: str, seconds: float, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        ask.plan(warmslip.load("quasistatic_punch"), error, of, seconds=seconds)
+
+
+def test_run_takes_an_error(tmp_path: Path) -> None:
+    scene = warmslip.load("heat_slab")
+    answer = warmslip.run(scene, error=0.05, of="theta_L2")
+    known = answer.summary["error"]
+    assert known["estimated"] <= known["asked"] == 0.05
+    assert known["parts"].keys() == {"theta_L2"}
+    stored = warmslip.run(scene, error=0.05, of="theta_L2", out=tmp_path)
+    assert json.loads((tmp_path / "summary.json").read_text())["error"]["setting"] == known["setting"]
+    assert stored.theta.shape == answer.theta.shape
+    with pytest.raises(ValueError, match="resume: a run with error="):
+        warmslip.run(scene, error=0.05, out=tmp_path, resume=True)
+
+
+def test_the_commands(command: Command, tmp_path: Path) -> None:
+    planned = command("plan", "heat_slab", "--error", "5%")
+    assert planned.returncode == 0, planned.stderr
+    assert "choice: a mesh with n = " in planned.stdout
+    line = next(line for line in planned.stdout.splitlines() if line.startswith("run it with"))
+    assert line.startswith("run it with: warmslip run heat_slab --set ")
+    done = command("run", "heat_slab", "--error", "5%", "--out", "run")
+    assert done.returncode == 0, done.stderr
+    assert "estimated error" in done.stdout
+    assert json.loads((tmp_path / "run/summary.json").read_text())["error"]["asked"] == 0.05
+    for words, message in (
+        (("--error", "5"), "write 1% or 0.01"),
+        (("--error", "x%"), "write 1% or 0.01"),
+        (("--error", "5%", "--resume"), "leave --resume"),
+        (("--error", "5%", "--of", "force"), "unknown"),
+    ):
+        refused = command("run", "heat_slab", *words)
+        assert refused.returncode == 2 and message in refused.stderr
