@@ -1,8 +1,8 @@
 """Errors that are asked for, on random scenes: whether the answers have them, and whether the choices are cheap.
 
 Each scene is solved for a target. The true error of the answer is its distance to a run with twice the cells and four times the
-steps. A grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the choice
-is compared with. `python tests/campaign/asked.py --count 40` takes a quarter of an hour on one core.
+steps. A grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the
+choice is compared with. `python tests/campaign/asked.py --count 40` takes a quarter of an hour on one core.
 """
 
 from __future__ import annotations
