@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, grid_lines, number
 from warmslip.records import tables
@@ -43,7 +44,7 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
             ax.set_visible(False)
         for ax, key in zip(line, shown[name], strict=False):
             handles |= _panel(ax, rows, key)
-            ax.set_title(f"{name.replace('_', ' ')}: {ERRORS[key]}", fontsize=9)
+            ax.set_title(f"{_title(name)}: {ERRORS[key]}", fontsize=9)
         line[0].set_ylabel("largest error over time")
         captions.append(_best(name, rows))
     for ax in axes[-1]:
@@ -62,8 +63,15 @@ def _panel(ax: Any, rows: list[tables.Row], key: str) -> dict[str, Any]:
     half = next(row for row in rows if row["method"] == "reference, half")
     if half[key] > 0:  # of order one: what the reference errs is about its distance to its half
         ax.axhline(half[key], color=GREY, lw=0.8, ls=(0, (4, 3)))
+    if ax.get_ylim()[1] > 10 * ax.get_ylim()[0]:
+        ax.yaxis.set_minor_formatter(NullFormatter())
     grid_lines(ax)
     return handles
+
+
+def _title(name: str) -> str:
+    """The contest of a table trade_NAME."""
+    return name.removeprefix("trade_").replace("_", " ")
 
 
 def _best(name: str, rows: list[tables.Row]) -> str:
@@ -74,7 +82,7 @@ def _best(name: str, rows: list[tables.Row]) -> str:
     best = min(others, key=lambda row: row["cpu_seconds"])
     gain = finest["cpu_seconds"] / best["cpu_seconds"]
     return (
-        f"{name.replace('_', ' ')}: the error {number(finest['e_sum'])} of equal steps with n = {finest['n']} "
+        f"{_title(name)}: the error {number(finest['e_sum'])} of equal steps with n = {finest['n']} "
         f"({number(finest['cpu_seconds'])} s) is had by {best['method']} with n = {best['n']} in "
         f"{number(best['cpu_seconds'])} s, {number(gain)} times quicker."
     )

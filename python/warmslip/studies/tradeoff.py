@@ -82,8 +82,8 @@ class Contest:
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
-    "paper_cold": Contest("paper_mixed", {}, list(METHODS), [8, 16, 32, 64, 128], 256),
-    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), [8, 16, 32, 64, 128], 256),
+    "paper_cold": Contest("paper_mixed", {}, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
+    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
     "heat": Contest("heat_slab", {}, ["equal steps", "graded steps", "adaptive steps"], [4, 8, 16, 32], 64, ratio=8),
     "impact": Contest(
         "elastic_drop",
