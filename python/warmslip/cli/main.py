@@ -83,7 +83,7 @@ def main() -> None:
             prog_name="warmslip", standalone_mode=False
         )  # else typer draws a box around what is wrong with a call
         if code == 130:  # typer's word for Ctrl-C
-            _say("interrupted; nothing of this call is kept", everywhere=False)
+            _say("interrupted; files that were written are kept", everywhere=False)
         sys.exit(code if isinstance(code, int) else 0)
     except SceneError as error:  # every rank reads the same scene and refuses it alike
         _say(str(error), everywhere=False)

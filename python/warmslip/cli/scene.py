@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -40,9 +41,14 @@ def run(
     """Run a scene. Exit code 0: completed; 1: stopped early; 2: invalid input; 130: interrupted, see --resume."""
     if backend not in ("automatic", "cholmod", "petsc"):
         raise SceneError(f"--backend '{backend}' is unknown; use automatic, cholmod or petsc")
+    if dry_run and error:
+        plan_(scene, error, set_, of, seconds)
+        return
     if dry_run:
         explain(scene, set_, trial=False)
         return
+    if of != "all" and not error:
+        raise SceneError("--of says what --error is of; give both")
     checked = reader.load(scene, set_)
     _refuse_dashless(petsc)
     wanted = relative(error) if error else None
@@ -154,10 +160,11 @@ def plan_(
     found = ask.plan(checked, relative(error), of, seconds=seconds, say=_say if first else lambda _: None)
     if first:
         typer.echo(ask.text(found))
-        typer.echo(
-            f"run it with: warmslip run {scene} "
-            + " ".join(f'--set "{key}"' for key in ask.keys_of(found.choice.scene))
-        )
+        keys = [*(set_ or []), *ask.keys_of(found.choice.scene)]
+        words = ["warmslip", "run", scene, *(word for key in keys for word in ("--set", key))]
+        typer.echo(f"run it with: {shlex.join(words)}")
+        if checked.time.tolerance is not None and found.choice.scene.time.tolerance is None:
+            typer.echo("and leave time.tolerance out of the scene")
 
 
 def _refuse_dashless(petsc: str) -> None:
@@ -178,7 +185,8 @@ def _ending(summary: dict[str, Any]) -> str:
     """The end of a run in a few words; of one that stopped, the residuals of the step that was rejected."""
     failure = summary["failure"]
     if summary["outcome"] == "interrupted":
-        return f"after {summary['steps']} of {summary['stamp']['scene']['time']['steps']} steps, --resume goes on"
+        end = summary["stamp"]["scene"]["time"]["end"]
+        return f"after {summary['steps']} steps, at t = {summary['time']:g} of {end:g}; --resume goes on"
     if failure is None:
         worst = max(summary["balances"][i] for i in ("energy", "heat", "force", "law"))
         return f"{summary['steps']} steps, largest balance residual {worst:.1e}, {_digits(summary['digits'])}"

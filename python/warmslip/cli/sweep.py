@@ -30,11 +30,32 @@ def values_of(text: str) -> tuple[str, list[Any]]:
             raise SceneError(f"--vary '{text}' is no range; write first:last:count, such as 0:1:11") from None
         if count < 1 or not np.isfinite([first, last]).all():
             raise SceneError(f"--vary '{text}' has no values; give finite ends and a count of 1 or more")
-        return key.strip(), [float(value) for value in np.linspace(first, last, count)]
+        values = [float(value) for value in np.linspace(first, last, count)]
+        whole = all(part.strip().lstrip("-").isdecimal() for part in parts) and all(v.is_integer() for v in values)
+        return key.strip(), [int(value) for value in values] if whole else values
+    if ":" in given and "[" not in given:
+        raise SceneError(f"--vary '{text}' is no range; write first:last:count, such as 0:1:11")
     whole = parse(given.strip())
     if isinstance(whole, list):
         return key.strip(), whole
-    return key.strip(), [parse(part.strip()) for part in given.split(",")]
+    return key.strip(), [parse(part.strip()) for part in _split(given)]
+
+
+def _split(text: str) -> list[str]:
+    """A list at its commas, but for those inside brackets or quotes."""
+    parts, depth, quote = [""], 0, ""
+    for letter in text:
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        else:
+            depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and depth == 0 and not quote:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts
 
 
 def _part(text: str) -> tuple[int, int]:

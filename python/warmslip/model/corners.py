@@ -2,7 +2,8 @@
 
 Plane elasticity: M. L. Williams, J. Appl. Mech. 19, 1952, in the form of A. Roessle, J. Elasticity 60, 2000. The tensor
 that counts is that of the highest time derivative in play: the viscosity where there is one. A contact side is a
-traction side here: the compliance and bounded friction are lower order. Across an edge in space the displacement is in plane
+traction side here, as a compliance is of lower order; on a rigid foundation it is a clamped one too, as its points may
+stick, and the smaller exponent counts. Across an edge in space the displacement is in plane
 strain, and its component along the edge behaves like a temperature. Lengths and angles (radians) as in the mesh.
 """
 
@@ -128,6 +129,7 @@ def corners(scene: Scene, mesh: Any) -> list[Corner]:
     openings = _openings(cells, nodes, set(around))
     held, cooled_parts = set(scene.supports.displacement), set(scene.supports.temperature)
     touching = {contact.part for contact in scene.contacts}
+    rigid = {contact.part for contact in scene.contacts if contact.rigid}
     elastic: dict[Any, float] = {}
     out = []
     for ridge, sides in sorted(around.items()):
@@ -143,10 +145,13 @@ def corners(scene: Scene, mesh: Any) -> list[Corner]:
         lam, mu = leading_lame(scene, region)
         u = float("nan")
         if scene.moves and mu > 0:
-            key = round(angle, 6), clamped, lam, mu
-            if key not in elastic:
-                elastic[key] = elastic_exponent(lam, mu, angle, (clamped[0], clamped[1]))
-            u = elastic[key] if d == 2 else min(elastic[key], scalar_exponent(angle, (clamped[0], clamped[1])))
+            stuck = tuple(c or part in rigid for c, part in zip(clamped, parts, strict=True))
+            for fixed in {clamped, stuck}:
+                key = round(angle, 6), fixed, lam, mu
+                if key not in elastic:
+                    elastic[key] = elastic_exponent(lam, mu, angle, (fixed[0], fixed[1]))
+                found = elastic[key] if d == 2 else min(elastic[key], scalar_exponent(angle, (fixed[0], fixed[1])))
+                u = min(u, found) if u == u else found
         words = tuple(
             "clamped" if c else "contact" if part in touching else "traction"
             for part, c in zip(parts, clamped, strict=True)
@@ -170,10 +175,18 @@ def _theta(
         return float("nan")
     heat = getattr(region, "heat", None)
     given = heat.conductivity if heat is not None else scene.heat.conductivity
-    if len(ridge) == 2 or not isinstance(given, list):
+    if not isinstance(given, list):
         return scalar_exponent(angle, cooled) if np.any(np.asarray(given)) else float("nan")
-    ends = [next(node for node in facet if node != ridge[0]) for facet in facets.tolist()]
-    return thermal_exponent(given, nodes[ends] - nodes[ridge[0]], angle, cooled)
+    ends = [next(node for node in facet if node not in ridge) for facet in facets.tolist()]
+    sides, k = nodes[ends] - nodes[ridge[0]], np.array(given, dtype=float)
+    if len(ridge) == 2:  # across the edge: nothing changes along it
+        along = nodes[ridge[1]] - nodes[ridge[0]]
+        across = np.linalg.svd(along[None, :])[2][1:]
+        k, sides = across @ k @ across.T, sides @ across.T
+        turn = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+        if (turn < 0) != (angle > np.pi):  # the first side to the second through the body
+            sides = sides[::-1]
+    return thermal_exponent(k, sides, angle, cooled)
 
 
 def _region(scene: Scene, mesh: Any, cell: int) -> Any:

@@ -66,7 +66,7 @@ def _point(scene: Scene, mesh: Any, given: GradedTable) -> Grading:
     if away[nearest] > 1e-9 * np.ptp(nodes, axis=0).max():
         near = ", ".join(f"{x:.6g}" for x in nodes[nearest])
         raise ValueError(f"mesh.graded_to: {given.at} is no node of the coarsest mesh; the nearest one is [{near}]")
-    found = [corner.exponent for corner in corners(scene, mesh) if corner.nodes == (nearest,)]
+    found = [c.exponent for c in corners(scene, mesh) if c.nodes == (nearest,) and c.exponent < 1]
     exponent = given.exponent or min(found, default=ELSEWHERE)
     return Grading(np.array([[nearest]]), fraction(exponent))
 

@@ -138,7 +138,7 @@ def plan(scene: Scene) -> Plan:
     }
     both = moves and heat is not None
     coupled = both and scene.time.coupling == "monolithic"
-    steps = []
+    steps = _clock(scene)
     if coupled:
         steps.append("one substitution with the factor of both fields")
     else:
@@ -169,6 +169,20 @@ def plan(scene: Scene) -> Plan:
         assumed=_assumed(scene),
         warnings=plausible_data.of_scene(scene),
     )
+
+
+def _clock(scene: Scene) -> list[str]:
+    """The steps, where they are not equal."""
+    clock, time = scene.clock, scene.time
+    if time.tolerance is not None:
+        return [f"steps of {scene.step:.3g} or shorter, each with an estimated error below {time.tolerance:g}"]
+    if not time.graded_to:
+        return []
+    towards = ", ".join(f"{t:g}" for t in time.graded_to)
+    return [
+        f"{clock.steps} steps of {clock.shortest:.3g} to {clock.longest:.3g}, graded to t = {towards}: "
+        f"{len(clock.sizes)} factorizations of each operator"
+    ]
 
 
 def _heat_by_contact(touching: list[ContactTable]) -> list[str]:

@@ -10,23 +10,33 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
 FIELDS = ("w", "theta")
 
 
+NOISE = 1e-8  # strain per displacement over the size of the body below which a strain is rounding
+
+
 class LocalError:
     """Of one run. `remember` notes the state before a step, `of` estimates the step, `take` makes it the last one.
 
     Errors are relative to the largest value of a field in the states so far, those of steps that were taken back included: the
-    first try of a run is a longest step, which tells what the fields are going to be. The displacement is measured by |.|_V,
-    velocity and temperature by |.|_L2. The velocity may jump, when a body meets its foundation; its error is therefore that of
-    its mean over the longest step, which shrinks with the step also then.
+    first try of a run is a longest step, which tells what the fields are going to be. The displacement is measured by |.|_V and,
+    as that does not see rigid motions, by |.|_L2; velocity and temperature by |.|_L2. The velocity may jump, when a body meets
+    its foundation; its error is therefore that of its mean over the longest step, which shrinks with the step also then. Without
+    inertia the velocity is no state and has no part.
     """
 
     def __init__(self, discretisation: Discretisation, stepper: Any, longest: float) -> None:
         self._d, self._longest = discretisation, longest
+        scene = discretisation.scene
+        self._inertial = scene.inertia is not None and scene.inertia.density > 0
+        self._creeps = scene.viscosity is not None
+        self._extent = float(np.ptp(np.asarray(discretisation.mesh.nodes), axis=0).max())
         there = {name: getattr(stepper, name) for name in FIELDS}
 
         def vectors() -> dict[str, Any]:
@@ -37,8 +47,12 @@ class LocalError:
         self._scales = self._norms(stepper)
 
     def _norms(self, stepper: Any) -> dict[str, float]:
-        measures = {"u": self._d.norms.v, "w": self._d.norms.l2, "theta": self._d.norms.l2}
-        return {name: norm(v) for name, norm in measures.items() if (v := getattr(stepper, name)) is not None}
+        norms, found = self._d.norms, {}
+        if stepper.u is not None:
+            found = {"strain": norms.v(stepper.u), "u": norms.l2(stepper.u), "w": norms.l2(stepper.w)}
+        if stepper.theta is not None:
+            found["theta"] = norms.l2(stepper.theta)
+        return found
 
     def remember(self, stepper: Any) -> None:
         """Notes the state before a step (collective)."""
@@ -47,7 +61,7 @@ class LocalError:
 
     def of(self, stepper: Any, size: float) -> float:
         """The estimated error of the step of this `size` (time) that was taken last, dimensionless (collective)."""
-        worst, norms = 0.0, self._d.norms
+        worst = 0.0
         for name, value in self._norms(stepper).items():
             self._scales[name] = max(self._scales[name], value)
         for name, before in self._before.items():
@@ -56,10 +70,19 @@ class LocalError:
             now.copy(change)
             change.axpy(-1.0, before)
             if name == "w":
-                worst = max(worst, _ratio(size / 2 * norms.v(change), self._scales["u"]))
-            weight = math.sqrt(size / self._longest) if name == "w" else 1.0
-            worst = max(worst, weight * _ratio(self._bend(name, change, size), self._scales[name]))
+                worst = max(worst, self._displacement(change, size))
+            if name == "theta" or self._inertial:
+                weight = math.sqrt(size / self._longest) if name == "w" else 1.0
+                worst = max(worst, weight * _ratio(self._bend(name, change, size), self._scales[name]))
         return worst
+
+    def _displacement(self, change: Any, size: float) -> float:
+        """The estimated error of the displacement from the change of the velocity."""
+        if self._size == 0 and not (self._inertial or self._creeps):
+            return 0.0  # every step is in equilibrium, and there is no velocity before the first
+        norms, scales = self._d.norms, self._scales
+        strain = max(scales["strain"], NOISE * scales["u"] / self._extent)
+        return max(_ratio(size / 2 * norms.v(change), strain), _ratio(size / 2 * norms.l2(change), scales["u"]))
 
     def _bend(self, name: str, change: Any, size: float) -> float:
         """k_n/(k_n + k_{n-1}) times the distance to the straight line through the two states before."""

@@ -8,13 +8,15 @@ on half its mesh and steps; if their distance says that the error is larger than
 from __future__ import annotations
 
 import math
-import resource
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from warmslip.mesh import files
+from warmslip.messages import quoted
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.errors import SceneError
+from warmslip.scene.mesh_table import COARSEST
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import QUANTITIES, Companion, march, order
@@ -32,6 +34,7 @@ MESHES, STEPS = ("uniform", "graded"), ("equal", "graded", "adaptive")
 LONGEST = 16  # longest steps of an adaptive clock
 LARGEST = {2: 1024, 3: 64}  # cells along the shortest side that are considered
 MOST_STEPS = 100_000
+MOST_PILOT_CELLS = 100_000
 KEPT = 0.5  # share of the memory of the machine that a run may take
 
 Say = Callable[[str], None]
@@ -39,7 +42,9 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Setting:
-    """Kind of mesh and steps, cells along the shortest side (halvings of a file), and steps where all are equal.
+    """Kind of mesh and steps, how fine the mesh is, and the number of steps where all are equal.
+
+    `cells` multiplies the smallest counts of cells that have the ratio of the scene's; of a file it is `refine`.
 
     With graded steps the longest one is that of so many equal ones; the tolerance of adaptive ones is 1/count^2.
     """
@@ -125,18 +130,18 @@ def wanted(scene: Scene, of: str) -> list[str]:
     if of == "all":  # without viscosity the velocity jumps, and its largest error over time does not fall
         smooth = scene.viscosity is not None and scene.inertia is not None
         return [name for name in TERMS if there[name] and (smooth or name != "w_L2")]
-    if of not in QUANTITIES:
-        raise SceneError(f"--of '{of}' is unknown; give all, {', '.join(QUANTITIES)}")
+    if not isinstance(of, str) or of not in QUANTITIES:
+        raise SceneError(f"of: {quoted(of)} is unknown; give all, or one of {', '.join(QUANTITIES)}")
     if not there[of]:
-        raise SceneError(f"--of '{of}': the scene has no such quantity")
+        raise SceneError(f"of: the scene has no {of}; give another quantity")
     return [of]
 
 
 class Pilots:
     """Pilot runs of one scene, and the models that they give."""
 
-    def __init__(self, scene: Scene, quantities: Sequence[str], say: Say) -> None:
-        self.scene, self.quantities, self._say = scene, list(quantities), say
+    def __init__(self, scene: Scene, quantities: Sequence[str], say: Say, limit: float = math.inf) -> None:
+        self.scene, self.quantities, self._say, self.limit = scene, list(quantities), say, limit
         self.seconds = 0.0
         self.sizes = dict.fromkeys(QUANTITIES, 0.0)
         self.space: dict[str, Model] = {}
@@ -149,9 +154,12 @@ class Pilots:
         d = scene.mesh.dim
         self.file = scene.mesh.file is not None
         counts = scene.mesh.counts if not self.file else [1]
+        self._cells_of_file = len(files.read(str(scene.mesh.file)).cells) if self.file else 0
         gcd = math.gcd(*counts)
         self._unit = [count // gcd for count in counts]
-        self._first = 16 if d == 2 else 8
+        self._first = 4
+        while self._first * min(self._unit) < (16 if d == 2 else 8):
+            self._first *= 2
         self._count = 16
 
     def make(self, setting: Setting) -> Scene:
@@ -167,7 +175,7 @@ class Pilots:
         if self.file:
             keys["mesh.refine"] = setting.cells
         else:
-            counts = [unit * max(1, round(setting.cells / min(self._unit))) for unit in self._unit]
+            counts = [unit * setting.cells for unit in self._unit]
             keys["mesh.n"] = counts[0] if len(set(counts)) == 1 else counts
             keys["mesh.grading"] = None if setting.mesh == "graded" else self.scene.mesh.grading
         return self.scene.override(**keys)
@@ -189,6 +197,8 @@ class Pilots:
         runs = [self.companion(setting) for setting in settings]
         found, size = march(runs, [(i, i + 1) for i in range(len(runs) - 1)])
         self.seconds += sum(run.seconds for run in runs)
+        if self.seconds > self.limit:
+            raise SceneError(f"the pilot runs alone took {self.seconds:.2g} s of CPU; allow more seconds")
         self.sizes = {name: max(value, size[name]) for name, value in self.sizes.items()}
         finest = runs[0].simulation.stepper.cost
         sizes = len(runs[0].simulation.pace.record.sizes)
@@ -212,6 +222,10 @@ class Pilots:
 
     def measure_space(self, mesh: str, cells: int) -> None:
         """Three meshes, up to so many cells along the shortest side, with few steps."""
+        if self.file and self._cells_of_file * 2.0 ** (self.scene.mesh.dim * cells) > MOST_PILOT_CELLS:
+            raise SceneError(
+                f"a pilot run on the file with refine = {cells} has too many cells; start from a coarser file"
+            )
         self._cells[mesh] = cells
         sizes = [cells, cells - 1, cells - 2] if self.file else [cells, cells // 2, cells // 4]
         self._say(f"pilot runs: {mesh} meshes up to {'refine = ' if self.file else 'n = '}{cells}")
@@ -273,9 +287,12 @@ class Pilots:
         if self.file:
             sizes = list(range(1, 7))
         else:
-            bases = range(4, 8)
-            sizes = sorted({base * 2**i for base in bases for i in range(1, 9) if base * 2**i <= LARGEST[d]})
-        counts = sorted({4 * max(1, round(2 ** (i / 3))) for i in range(45)})
+            side = min(self._unit)
+            sizes = sorted({base * 2**i for base in range(4, 8) for i in range(9) if base * 2**i * side <= LARGEST[d]})
+            sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8]
+            if mesh == "graded":  # also on half the cells, which the companions have
+                sizes = [n for n in sizes if n % 4 == 0 and n * side >= 4 * COARSEST]
+        counts = sorted({4 * max(4, round(2 ** (i / 3))) for i in range(45)})
         return [Setting(mesh, steps, cells, count) for cells in sizes for count in counts if count <= MOST_STEPS]
 
     def cheapest(self, mesh: str, steps: str, aim: float, seconds: float, room: float) -> Choice:
@@ -337,20 +354,26 @@ def plan(scene: Scene, error: float, of: str = "all", *, seconds: float = math.i
 
 
 def _plan(scene: Scene, error: float, of: str, seconds: float, say: Say) -> tuple[Plan, Pilots]:
-    if not 0 < error < 1:
-        raise SceneError(f"--error {error:g} is no relative error; give a number between 0 and 1, or percent: 1%")
+    if isinstance(error, bool) or not isinstance(error, int | float) or not 0 < error < 1:
+        raise SceneError(f"error: {quoted(error)} is no relative error; give a number between 0 and 1, such as 0.01")
     if error < ROUND_OFF:
-        raise SceneError(f"--error {error:g} is below what rounding leaves; ask for {ROUND_OFF:g} or more")
+        raise SceneError(f"error: {error:g} is below what rounding leaves; ask for {ROUND_OFF:g} or more")
+    if not seconds > 0:
+        raise SceneError(f"seconds: {seconds:g} s is no time to run in; give a positive number")
+    if any(ratio != 1 for ratio in scene.mesh.grading or []):
+        raise SceneError(
+            "mesh.grading: its cells are not nested in coarser ones; leave it out, the mesh is chosen here"
+        )
     quantities = wanted(scene, of)
-    pilots = Pilots(scene, quantities, say)
+    pilots = Pilots(scene, quantities, say, seconds)
     first = 2 if pilots.file else 2 * pilots._first
     for mesh in MESHES:
         try:
             pilots.measure_space(mesh, first + (1 if pilots.file and mesh == "graded" else 0))
-        except (SceneError, ValueError) as why:  # no singular corner, or a mesh that cannot be graded
-            if mesh == "uniform":
+        except (SceneError, ValueError):  # no singular corner, or a mesh that cannot be graded
+            if mesh == "uniform" or pilots.seconds > seconds:
                 raise
-            say(f"no graded mesh: {why}")
+            say("no graded mesh: the solution is singular at no corner, or the mesh cannot be halved often enough")
     for steps in STEPS:
         pilots.measure_time(steps, 4 * pilots._count)
     aim, room = error / SAFETY, KEPT * _memory()
@@ -361,9 +384,10 @@ def _plan(scene: Scene, error: float, of: str, seconds: float, say: Say) -> tupl
             break
     if best is None:
         nearest = min(found, key=lambda one: one.error)
+        least = math.ceil(1000 * SAFETY * nearest.error * 1.05) / 1000
         limit = f" in {seconds:g} s" if math.isfinite(seconds) else ""
         raise SceneError(
-            f"an error of {100 * error:.3g} % cannot be had{limit}; the best is {100 * SAFETY * nearest.error:.2g} %, in about "
+            f"an error of {100 * error:.3g} % cannot be had{limit}; the best is {100 * least:.3g} %, in about "
             f"{nearest.seconds:.2g} s: ask for that, or allow more"
         )
     orders = {f"{mesh} mesh": pilots.space[mesh].order for mesh in pilots.space}
@@ -490,7 +514,7 @@ def text(found: Plan) -> str:
     ]
     lines += [
         f"  {describe(one)}: {100 * one.error:.2g} %, {one.seconds:.2g} s"
-        + ("" if one.met else " (the error is too large)")
+        + ("" if one.met else f" (too large: {SAFETY:g} times the error must be below the target)")
         for one in found.alternatives
     ]
     return "\n".join(lines)
@@ -500,12 +524,7 @@ def keys_of(scene: Scene) -> list[str]:
     """The keys of mesh and time of a chosen scene, as `--set` takes them."""
     mesh, time = scene.mesh, scene.time
     out = [f"mesh.refine={mesh.refine}" if mesh.file is not None else f"mesh.n={mesh.n}"]
-    out += ["mesh.graded_to=['corners']"] if mesh.graded_to else []
-    out += [f"time.steps={time.steps}"]
-    out += [f"time.tolerance={time.tolerance:.6g}"] if time.tolerance is not None else []
-    return out + ([f"time.graded_to={time.graded_to}"] if time.graded_to else [])
-
-
-def peak() -> float:
-    """Bytes of this process at its largest."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
+    out += [f"mesh.graded_to={['corners'] if mesh.graded_to else []}", f"time.steps={time.steps}"]
+    if time.tolerance is not None:
+        return [*out, f"time.tolerance={time.tolerance!r}"]
+    return [*out, f"time.graded_to={time.graded_to}"]

@@ -5,6 +5,7 @@ Nothing is stored: two runs are compared at each time that both reach.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from warmslip.scene.errors import SceneError
+from warmslip.scene.mesh_table import COARSEST
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.error_norms import TERMS, Comparison
@@ -178,17 +180,23 @@ def coarser(scene: Scene, times: int = 1) -> Scene:
     table = scene.mesh
     if table.file is not None:
         if table.refine - times < (1 if table.graded_to else 0):
+            least = times + (1 if table.graded_to else 0)
             raise SceneError(
-                f"mesh.refine = {table.refine}: the mesh cannot be coarsened {times} times; give refine = {table.refine + 1}"
+                f"mesh.refine = {table.refine}: the mesh cannot be coarsened {times} times; give refine = {least}"
             )
         return scene.override(**{"mesh.refine": table.refine - times})
-    divisor = 2**times
-    counts = table.counts
-    if any(count % divisor or count < 2 * divisor for count in counts) or (table.graded_to and table.halvings <= times):
-        least = [max(2 * divisor, divisor * round(count / divisor)) for count in counts]
-        n = least[0] if len(set(least)) == 1 else least
-        more = f" or {8 * divisor} at least" if table.graded_to else ""
-        raise SceneError(f"mesh.n = {table.n}: the mesh cannot be halved {times} times; give n = {n}{more}")
+    if any(ratio != 1 for ratio in table.grading or []):
+        raise SceneError("mesh.grading: its cells are not nested in coarser ones; leave it out, or give graded_to")
+    divisor, counts = 2**times, table.counts
+    small = any(count % divisor or count < 2 * divisor for count in counts)
+    if small or (table.graded_to and table.halvings <= times):
+        least = 2 * COARSEST * divisor if table.graded_to else 2 * divisor  # cells along the shortest side
+        common = math.gcd(*counts)
+        unit = [count // common for count in counts]
+        multiple = divisor * max(1, round(common / divisor), math.ceil(least / min(unit) / divisor))
+        wanted = [one * multiple for one in unit]
+        n = wanted[0] if len(set(wanted)) == 1 else wanted
+        raise SceneError(f"mesh.n = {table.n}: the mesh cannot be halved {times} times; give n = {n}")
     halves = [count // divisor for count in counts]
     return scene.override(**{"mesh.n": halves[0] if isinstance(table.n, int) else halves})
 
@@ -198,14 +206,23 @@ def slower(scene: Scene, times: int = 1) -> Scene:
     time, factor = scene.time, 2**times
     if time.tolerance is not None:
         return scene.override(**{"time.tolerance": min(1.0, time.tolerance * 4.0**times)})
-    if time.steps % factor:
-        raise SceneError(f"time.steps = {time.steps}: the number cannot be divided by {factor}; give a multiple of it")
-    found = scene.override(**{"time.steps": time.steps // factor})
-    if found.clock.steps * factor != scene.clock.steps:
-        raise SceneError(
-            f"time.steps = {time.steps}: blocks of steps cannot be divided by {factor}; give a multiple of {4 * factor}"
+
+    def nests(steps: int) -> bool:
+        return steps % factor == 0 and all(
+            one.steps == factor * other.steps
+            for one, other in zip(
+                scene.override(**{"time.steps": steps}).clock.blocks,
+                scene.override(**{"time.steps": steps // factor}).clock.blocks,
+                strict=True,
+            )
         )
-    return found
+
+    if not nests(time.steps):
+        above = factor * math.ceil(time.steps / factor)
+        found = next((n for n in range(above, above + 400 * factor, factor) if nests(n)), None)
+        cure = f"give {found}" if found else "give times whose distances are simple fractions of the end"
+        raise SceneError(f"time.steps = {time.steps}: the steps cannot be joined {times} times in pairs; {cure}")
+    return scene.override(**{"time.steps": time.steps // factor})
 
 
 def order(gaps: Sequence[float], least: float, most: float, default: float) -> float:

@@ -109,6 +109,8 @@ def study(
         raise SceneError("mesh.refine: the levels of a study refine the file themselves; leave it out")
     if any(ratio != 1 for ratio in scene.mesh.grading or []):
         raise SceneError("mesh.grading: graded cells are not nested in each other; leave it out for a study")
+    if scene.time.tolerance is not None:
+        raise SceneError("time.tolerance: a study compares runs with steps that are given; leave it out")
     if steps_per_level is None:
         steps_per_level = scene.time.steps if scene.mesh.file is not None else 1
     if steps_per_level < 1:
@@ -126,14 +128,23 @@ def study(
     compare = {n: Comparison(d, meshes[reference]) for n, d in meshes.items()}
     steps = {id(run): run.steps() for run, _ in runs}
     reference_steps = finest.steps()
-    for n in range(1, steps_per_level * reference + 1):
+    total = finest.scene.clock.steps
+    for run, _ in runs:
+        clock = run.scene.clock
+        every = total // clock.steps
+        if total % clock.steps or not np.allclose(finest.scene.clock.times[every - 1 :: every], clock.times, rtol=1e-9):
+            raise SceneError(
+                f"time.graded_to: the times of {run.scene.time.steps} steps are not among those of "
+                f"{finest.scene.time.steps}; give --steps-per-level 4 or more"
+            )
+    for n in range(1, total + 1):
         _next(reference_steps, finest)
         for run, largest in runs:
-            if n % (steps_per_level * reference // run.scene.time.steps) == 0:
+            if n % (total // run.scene.clock.steps) == 0:
                 _next(steps[id(run)], run)
                 largest.add(compare[run.scene.mesh.level].difference(run.stepper, finest.stepper))
         if progress:
-            progress(n, steps_per_level * reference)
+            progress(n, total)
     return [*(row(run, largest.values) for run, largest in runs), row(finest, None)]
 
 

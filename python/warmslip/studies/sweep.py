@@ -48,7 +48,12 @@ def variations(scene: Scene, vary: Mapping[str, Sequence[Any]]) -> list[Variatio
     SceneError
         For nothing to vary, too many runs, or values that the scene cannot have, which are named.
     """
-    if not vary or not all(len(values) for values in vary.values()):
+    if not isinstance(vary, Mapping) or not all(
+        isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) for values in vary.values()
+    ):
+        raise SceneError("vary: give lists of values by key, {'contact.friction.coefficient': [0.0, 0.1]}")
+    vary = {key: values.tolist() if isinstance(values, np.ndarray) else list(values) for key, values in vary.items()}
+    if not vary or not all(vary.values()):
         raise SceneError("a sweep needs a key and its values; write --vary contact.friction.coefficient=0,0.1,0.2")
     count = math.prod(len(values) for values in vary.values())
     if count > MOST:
@@ -183,7 +188,7 @@ def sweep(
     every = variations(scene, vary)
     mine = every[len(every) * (i - 1) // of : len(every) * i // of]
     folder = Path(out) if out is not None else None
-    found = _stored(folder, mine) if folder is not None else {}
+    found, others = _stored(folder, scene, list(vary), mine) if folder is not None else ({}, [])
     todo = [one for one in mine if one.number not in found]
     writes = folder is not None and MPI.COMM_WORLD.rank == 0
     name = NAME if of == 1 else f"{NAME}.{i}of{of}"
@@ -191,35 +196,55 @@ def sweep(
         found[row["run"]] = row
         if writes:
             assert folder is not None
-            _write(folder / f"{name}.csv", found)
+            _write(folder / f"{name}.csv", found, others)
         if progress:
             progress(len(found), len(mine), row)
     rows = [found[number] for number in sorted(found)]
     if writes and rows:
         assert folder is not None
         keys = {key: [_cell(value) for value in values] for key, values in vary.items()}
-        tables.write(folder / f"{name}.csv", rows, stamp(scene, vary=keys))
+        tables.write(folder / f"{name}.csv", _joined(found, others), stamp(scene, vary=keys))
     return rows
 
 
-def _write(path: Path, found: Mapping[int, tables.Row]) -> None:
+def _joined(found: Mapping[int, tables.Row], others: Sequence[tables.Row]) -> list[tables.Row]:
+    """The rows of this sweep in order, and behind them those of earlier ones of the same scene and keys."""
+    rows = [found[number] for number in sorted(found)]
+    return rows + [row | {"run": len(rows) + i} for i, row in enumerate(others, start=1)]
+
+
+def _write(path: Path, found: Mapping[int, tables.Row], others: Sequence[tables.Row]) -> None:
     """The table so far, beside its place first, so that there is always a whole one."""
     part = path.with_suffix(".part")
-    tables.write(part, [found[number] for number in sorted(found)])
+    tables.write(part, _joined(found, others))
     part.replace(path)
 
 
-def _stored(folder: Path, wanted: Sequence[Variation]) -> dict[int, tables.Row]:
-    """Lines of the tables in a folder that are those of wanted runs, by number."""
+def _stored(
+    folder: Path, scene: Scene, keys: Sequence[str], wanted: Sequence[Variation]
+) -> tuple[dict[int, tables.Row], list[tables.Row]]:
+    """Rows of the tables in a folder: those of wanted runs, by number, and the others of the whole table.
+
+    Raises SceneError for a table of another scene or other keys, which would be lost.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     digests = {one.scene.digest(): one for one in wanted}
     out: dict[int, tables.Row] = {}
+    others: list[tables.Row] = []
     for path in sorted(folder.glob(f"{NAME}*.csv")):
-        for row in tables.read(path):
-            one = digests.get(str(row.get("scene")))
-            if one is not None and set(one.values) <= set(row):
+        rows = tables.read(path)
+        if list(rows[0])[1 : list(rows[0]).index("outcome")] != list(keys):
+            raise SceneError(f"{path} is a sweep over other keys; give another folder")
+        stamped = path.with_suffix(".json")
+        if stamped.exists() and json.loads(stamped.read_text()).get("scene_hash") != scene.digest():
+            raise SceneError(f"{path} is a sweep of another scene; give another folder")
+        for row in rows:
+            one = digests.get(str(row["scene"]))
+            if one is not None:
                 out[one.number] = row | {"run": one.number}
-    return out
+            elif path.stem == NAME:
+                others.append(row)
+    return out, others
 
 
 def _rows(todo: Sequence[Variation], jobs: int) -> Any:

@@ -181,5 +181,5 @@ def test_an_interrupted_command_says_so(
     monkeypatch.setattr("sys.argv", ["warmslip", "study", "paper_mixed", "--out", str(tmp_path / "s.csv")])
     with pytest.raises(SystemExit) as end:
         main.main()
-    assert end.value.code == 130 and "interrupted; nothing of this call is kept" in capsys.readouterr().err
+    assert end.value.code == 130 and "interrupted; files that were written are kept" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,7 @@ import pytest
 import warmslip
 from warmslip import SceneError, _core
 from warmslip.mesh.refinement import fraction
-from warmslip.model.corners import corners
+from warmslip.model.corners import corners, scalar_exponent
 from warmslip.model.meshes import coarsest, make_mesh
 from warmslip.scene.scene import Scene
 
@@ -94,6 +94,45 @@ def test_edges_of_a_cube() -> None:
     assert near[1] == pytest.approx(0.25 * fraction(singular[0].exponent), rel=1e-9)  # halved once, from 4 cells
     on_edge = np.unique(np.round(nodes[(nodes[:, 1] == 0) & (nodes[:, 2] == 1), 0], 12))
     assert np.diff(on_edge) == pytest.approx(np.full(8, 0.125))  # along an edge cells stay as they are
+
+
+def test_a_rigid_foundation_may_hold_its_corner() -> None:
+    soft, hard = (scene("paper_mixed", mesh__n=4, contact__stiffness=c) for c in (1e3, "rigid"))
+    below = {c.point: c.exponent_u for c in corners(hard, coarsest(hard.mesh))}
+    above = {c.point: c.exponent_u for c in corners(soft, coarsest(soft.mesh))}
+    assert above[0.0, 0.0] == 2.0
+    assert below[0.0, 0.0] == pytest.approx(above[0.0, 1.0], rel=1e-12)  # as where a clamp meets a free side
+
+
+def test_conduction_across_an_edge_is_that_of_the_plane() -> None:
+    k = [[1.0, 0.9], [0.9, 1.0]]
+    data: dict[str, Any] = {"time": {}, "heat": {"conductivity": k}, "supports": {"temperature": ["left"]}}
+    plane = Scene.model_validate(data | {"mesh": {"n": 4}})
+    space = Scene.model_validate(
+        data
+        | {"mesh": {"shape": "cube", "n": 4}, "heat": {"conductivity": [[*k[0], 0.0], [*k[1], 0.0], [0.0, 0.0, 1.0]]}}
+    )
+    flat = {c.point: c.exponent_theta for c in corners(plane, coarsest(plane.mesh))}
+    assert flat[0.0, 0.0] < 0.6 < 1 < flat[0.0, 1.0] or flat[0.0, 1.0] < 0.6
+    for corner in corners(space, coarsest(space.mesh)):
+        at = corner.point[:2]
+        if at in flat and 0 < corner.point[2] < 1:  # an edge along z, at a corner of the plane body
+            assert corner.exponent_theta == pytest.approx(flat[at], rel=1e-9)
+    assert any(c.exponent_theta < 0.6 for c in corners(space, coarsest(space.mesh)))
+
+
+def test_scalar_exponents() -> None:
+    assert scalar_exponent(1.5 * np.pi, (False, False)) == pytest.approx(2 / 3)
+    assert scalar_exponent(1.5 * np.pi, (True, False)) == pytest.approx(1 / 3)
+    assert scalar_exponent(np.pi / 2, (True, True)) == 2.0
+
+
+def test_a_corner_that_is_named_is_graded() -> None:
+    mesh = make_mesh(scene("heat_slab", mesh__n=[8, 8], mesh__graded_to=[[0.0, 0.0]]))
+    x = np.asarray(mesh.nodes)
+    plain = np.asarray(make_mesh(scene("heat_slab", mesh__n=[8, 8])).nodes)
+    nearest = [np.sort(np.linalg.norm(nodes, axis=1))[1] for nodes in (x, plain)]
+    assert nearest[0] == pytest.approx(2 * fraction(0.5) * nearest[1], rel=1e-9)
 
 
 def test_a_polygon_for_a_circle_has_no_corners() -> None:

@@ -126,6 +126,76 @@ def test_the_error_falls_like_the_root_of_the_tolerance() -> None:
     assert errors[1] / errors[2] == pytest.approx(2.0, abs=0.7)
 
 
+DROP: dict[str, Any] = {
+    "mesh": {"n": 4},
+    "time": {"end": 1.0, "steps": 8},
+    "inertia": {"density": 1.0},
+    "elasticity": {"lame": [100.0, 50.0]},
+    "viscosity": {"lame": [1.0, 0.5]},
+    "loads": {"body": [0.0, -1.0]},
+    "initial": {"velocity": [0.3, 0.0]},
+    "contact": {"part": "bottom", "stiffness": 1e3, "gap": 0.2, "friction": {"coefficient": 0.3}},
+}
+
+
+def moved(one: Scene, exact: dict[float, Any]) -> tuple[float, int]:
+    """Largest error of u at the times that are in `exact`, and the number of steps."""
+    simulation, worst = warmslip.Simulation(one), 0.0
+    for state, _ in simulation.steps():
+        if (u := exact.get(round(state.time, 12))) is not None:
+            worst = max(worst, float(np.abs(state.u - u).max()))
+    return worst, simulation.taken
+
+
+def fine(one: Scene, steps: int) -> dict[float, Any]:
+    return {
+        round(state.time, 12): state.u
+        for state, _ in warmslip.Simulation(one.override(**{"time.steps": steps})).steps()
+    }
+
+
+def test_a_body_that_drops_is_followed() -> None:
+    """It flies, strikes and slides: |.|_V alone would not see the flight."""
+    one = Scene.model_validate(DROP)
+    exact = fine(one, 4096)
+    found = [moved(one.override(**{"time.tolerance": tolerance}), exact) for tolerance in (1e-2, 1e-3, 2.5e-4)]
+    assert found[1][0] < 0.5 * found[0][0]
+    assert found[2][0] < 0.7 * found[1][0]
+    uniform, many = moved(one.override(**{"time.steps": 512}), exact)
+    assert found[1][0] < uniform and found[1][1] < many
+
+
+def test_nothing_happens_in_a_flight_without_forces() -> None:
+    data = {name: table for name, table in DROP.items() if name not in ("contact", "loads")}
+    for tolerance in (1e-3, 1e-6):
+        simulation = warmslip.Simulation(Scene.model_validate(data).override(**{"time.tolerance": tolerance}))
+        assert sum(1 for _ in simulation.steps()) == 8
+
+
+@pytest.mark.parametrize("inertial", [True, False])
+def test_the_motion_is_followed_to_the_root_of_the_tolerance(inertial: bool) -> None:
+    """A load that starts quickly and then rests, with the estimate of the displacement alone or with that of the velocity."""
+    data = {name: BLOCK[name] for name in ("elasticity", "viscosity")} | {
+        "mesh": {"n": 4},
+        "time": {"steps": 4},
+        "loads": {"body": [0.0, "1 - exp(-40 * t)"]},
+        "supports": {"displacement": ["top"]},
+    }
+    one = Scene.model_validate(data | ({"inertia": {"density": 1.0}} if inertial else {}))
+    exact = fine(one, 4096)
+    errors = [moved(one.override(**{"time.tolerance": tolerance}), exact)[0] for tolerance in (4e-3, 2.5e-4)]
+    assert 2 < errors[0] / errors[1] < 8
+    uniform, _ = moved(one.override(**{"time.steps": 64}), exact)
+    assert errors[1] < uniform
+
+
+def test_equilibrium_without_history_needs_no_short_steps() -> None:
+    data = {"mesh": {"n": 4}, "time": {"steps": 4, "tolerance": 1e-3}, "elasticity": {"lame": [10.0, 5.0]}}
+    data |= {"loads": {"body": [0.0, "t"]}, "supports": {"displacement": ["top"]}}
+    simulation = warmslip.Simulation(Scene.model_validate(data))
+    assert sum(1 for _ in simulation.steps()) == 4
+
+
 def test_a_jump_of_the_load_is_found() -> None:
     data = {name: BLOCK[name] for name in ("inertia", "elasticity", "viscosity")} | {
         "mesh": {"n": 4},

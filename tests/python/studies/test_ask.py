@@ -73,6 +73,12 @@ def test_no_grading_without_a_singular_corner() -> None:
     assert {one.setting.mesh for one in [found.choice, *found.alternatives]} == {"uniform"}
 
 
+def test_meshes_keep_the_ratio_of_their_sides() -> None:
+    found = ask.plan(warmslip.load("paper_mixed").override(**{"mesh.n": [3, 4]}), 0.2, seconds=30.0)
+    for one in [found.choice, *found.alternatives]:
+        assert 4 * one.scene.mesh.counts[0] == 3 * one.scene.mesh.counts[1]
+
+
 def test_a_smaller_error_costs_more() -> None:
     loose, tight = (ask.plan(warmslip.load("heat_slab"), error, "theta_L2").choice for error in (0.05, 0.005))
     assert tight.seconds > loose.seconds
@@ -86,8 +92,10 @@ def test_a_smaller_error_costs_more() -> None:
         (2.0, "all", 10.0, "no relative error"),
         (1e-13, "all", 10.0, "rounding"),
         (0.01, "pressure", 10.0, "unknown; give all"),
-        (0.01, "theta_L2", 10.0, "no such quantity"),
-        (1e-6, "u_V", 0.5, "cannot be had in 0.5 s; the best is"),
+        (0.01, "theta_L2", 10.0, "the scene has no theta_L2"),
+        (0.1, "u_V", 1e-3, "pilot runs alone took"),
+        (0.1, "u_V", -1.0, "no time to run in"),
+        (1e-6, "u_V", 5.0, "cannot be had in 5 s; the best is"),
     ],
 )
 def test_refusals(error: float, of: str, seconds: float, message: str) -> None:

@@ -104,14 +104,17 @@ def test_coarser_and_slower_scenes() -> None:
     assert slower(paper(4, 8, time__tolerance=1e-4)).time.tolerance == pytest.approx(4e-4)
     for scene, message in (
         (paper(6, 8), "give n = 8"),
-        (paper(16, 8, mesh__graded_to=["corners"]), "32 at least"),
+        (paper(16, 8, mesh__graded_to=["corners"]), "give n = 32"),
+        (warmslip.load("brake_pad"), "mesh.grading: its cells are not nested"),
+        (warmslip.load("heat_slab").override(**{"mesh.n": [3, 6]}), r"give n = \[8, 16\]"),
         (warmslip.load("plate_with_hole"), "give refine = "),
     ):
         with pytest.raises(SceneError, match=message):
             coarser(scene, 2)
     for scene, message in (
-        (paper(4, 6), "multiple of it"),
-        (paper(4, 4, time__graded_to=[0.0]), "give a multiple of 16"),
+        (paper(4, 6), "give 8"),
+        (paper(4, 4, time__graded_to=[0.0]), "give 8"),
+        (paper(4, 16, time__graded_to=[0.0, 0.3], time__halvings=4), "give "),
     ):
         with pytest.raises(SceneError, match=message):
             slower(scene, 2)
@@ -127,3 +130,17 @@ def test_orders_are_bounded() -> None:
     assert order([4.0, 1.0], 0.4, 1.2, 1.0) == 1.2
     assert order([1.0, 4.0], 0.4, 1.2, 1.0) == 0.4
     assert order([1.0, 0.0], 0.4, 1.2, 1.0) == 1.0
+
+
+def test_studies_of_graded_steps_compare_states_of_one_time() -> None:
+    graded = {"time__graded_to": [0.0], "time__halvings": 3}
+    rows = refinement_study.study(paper(4, 4, **graded), levels=[4, 8], reference=16, steps_per_level=2)
+    assert [row["steps"] for row in rows] == [paper(4, 2 * n, **graded).clock.steps for n in (4, 8, 16)]
+    runs = [Companion(paper(n, 2 * n, **graded)) for n in (16, 4, 8)]
+    found, _ = march(runs, [(0, 1), (0, 2)])
+    for row, distance in zip(rows, found, strict=False):
+        assert row["e_theta_L2"] == pytest.approx(distance.values["theta_L2"], rel=1e-12)
+    with pytest.raises(SceneError, match="leave it out"):
+        refinement_study.study(paper(4, 4, time__tolerance=0.01), levels=[4, 8], reference=16)
+    with pytest.raises(SceneError, match="times of 5 steps are not among"):
+        refinement_study.study(paper(4, 4, time__graded_to=[0.0, 0.3]), levels=[5, 10], reference=20)

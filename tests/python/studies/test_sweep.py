@@ -104,8 +104,15 @@ def test_a_table_of_all_combinations_goes_on_where_it_stopped(tmp_path: Path) ->
         assert row["warnings"] == len(expected["warnings"])
         assert row["digits"] == min(expected["digits"].values())
         assert row["outcome"] == "completed"
-    changed = sweep(scene.override(**{"mesh.n": 5}), vary, out=tmp_path)  # another scene: nothing is taken over
-    assert changed[0]["norm_u_V"] != rows[0]["norm_u_V"]
+    narrower = sweep(scene, {MU: [0.5], THETA: [10.0]}, out=tmp_path)  # what is there stays
+    assert len(narrower) == 1
+    assert {(row[MU], row[THETA]) for row in tables.read(tmp_path / "sweep.csv")} == {(r[MU], r[THETA]) for r in rows}
+    for other, keys, message in (
+        (scene.override(**{"mesh.n": 5}), vary, "sweep of another scene"),
+        (scene, {MU: [0.0]}, "sweep over other keys"),
+    ):
+        with pytest.raises(SceneError, match=message):
+            sweep(other, keys, out=tmp_path)
 
 
 def test_parts_and_processes_give_the_same_table(tmp_path: Path) -> None:
@@ -155,6 +162,9 @@ def test_two_ranks_fill_the_table(command: Command, tmp_path: Path) -> None:
         ("contact.gap=0:1:3", [0.0, 0.5, 1.0]),
         ("contact.stiffness=10,rigid", [10, "rigid"]),
         ("loads.body=[[0, 1], [1, 0]]", [[0, 1], [1, 0]]),
+        ("loads.body=[0, 1],[1, 0]", [[0, 1], [1, 0]]),
+        ("contact.gap=min(1, t),5", ["min(1, t)", 5]),
+        ("mesh.n=4:16:4", [4, 8, 12, 16]),
         ("contact.gap=0.1 * x", ["0.1 * x"]),
     ],
 )
@@ -167,6 +177,8 @@ def test_values_on_the_command_line(text: str, values: list[Any]) -> None:
     [
         ({}, "needs a key and its values"),
         ({MU: []}, "needs a key and its values"),
+        ({MU: 0.1}, "give lists of values"),
+        ([1], "give lists of values"),
         ({MU: [0.1, -1.0]}, "with contact.friction.coefficient = -1.0"),
         ({"contact.frction.coefficient": [0.1]}, "did you mean 'friction'"),
         ({MU: range(2000), GAP: range(2000)}, "1000000 are the most"),
@@ -175,7 +187,7 @@ def test_values_on_the_command_line(text: str, values: list[Any]) -> None:
 def test_refusals(vary: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         sweep(small("paper_mixed", {}), vary)
-    for text in ("contact.gap", "contact.gap=", "contact.gap=0:1:x", "contact.gap=0:inf:3"):
+    for text in ("contact.gap", "contact.gap=", "contact.gap=0:1:x", "contact.gap=0:inf:3", "contact.gap=0:1"):
         with pytest.raises(SceneError, match="--vary"):
             values_of(text)
     with pytest.raises(SceneError, match="part 3/2"):
