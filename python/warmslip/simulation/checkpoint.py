@@ -78,7 +78,7 @@ class Checkpoint:
 def _whole(path: Path) -> Checkpoint | None:
     """What a file holds, None for a torn one."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             arrays = {name: np.array(file[name]) for name in file.files}
         record = json.loads(str(arrays.pop("record")))
         record |= {"time": float.fromhex(record["time"]), "statistics": Statistics(**record["statistics"])}

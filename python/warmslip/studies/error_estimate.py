@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from warmslip.model.discretisation import discretise
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
 from warmslip.scene.validation import contact_keys
@@ -120,7 +121,11 @@ def estimate(scene: Scene, progress: Callable[[float, float], None] | None = Non
     models = _models(coarser(slower(scene)))
     if models:
         base = Companion(next(iter(models.values()))[0])
-        others = {name: Companion(other) for name, (_, other) in models.items()}
+        mesh = base.simulation.discretisation.mesh  # also where the other model has other singular corners
+        others = {
+            name: Companion(other, Simulation(other, discretisation=discretise(other, mesh=mesh)))
+            for name, (_, other) in models.items()
+        }
         several = [base, *others.values()]
         gaps, _ = march(several, [(0, i) for i in range(1, len(several))])
         for name, gap in zip(others, gaps, strict=True):

@@ -148,7 +148,7 @@ def test_a_study_of_ones_own(command: Command, tmp_path: Path) -> None:
     call = "study elastic_drop --levels 2,4 --reference 8 --steps-per-level 5 --out own.csv"
     done = command(*call.split())
     assert done.returncode == 0, done.stderr
-    rows = list(csv.DictReader((tmp_path / "own.csv").open()))
+    rows = list(csv.DictReader((tmp_path / "own.csv").read_text().splitlines()))
     assert [(row["n"], row["steps"]) for row in rows] == [("2", "10"), ("4", "20"), ("8", "40")]
     drawn = command("draw", "study", "own.csv", "--out", "own.png")
     assert drawn.returncode == 0, drawn.stderr
