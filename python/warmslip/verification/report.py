@@ -49,7 +49,7 @@ def audits(paths: Sequence[Path]) -> Iterator[str]:
     yield "\n## audits\n\nWhat the theory assumes, on the paper's data sets with the hot foundation (`warmslip check SCENE`). "
     yield "What each answer means is in "
     yield ", ".join(f"[{path.name}]({path.name})" for path in paths)
-    yield "; the topic `audited` puts to a run what a run can contradict.\n\n"
+    yield "; the topic `assumptions` puts to a run what a run can contradict.\n\n"
     yield row("what", "statement", *names) + "| --- " * (2 + len(names)) + "|\n"
     for topic, statement in dict.fromkeys(key for own in found.values() for key in own):
         cells = []
