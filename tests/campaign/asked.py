@@ -18,8 +18,8 @@ from warmslip.scene.errors import SceneError
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
 from warmslip.studies import ask
-from warmslip.studies.ask import Pilots, Setting
 from warmslip.studies.companions import Companion, march
+from warmslip.studies.pilots import MESHES, STEPS, Pilots, Setting
 from warmslip.studies.refinement_study import stamp
 
 TARGETS = {2: 0.1, 3: 0.25}
@@ -91,8 +91,8 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> tuple[floa
     cells, counts, finest = GRID[d]
     reference = pilots.companion(Setting("graded", "graded", finest, 4 * max(counts)))
     entries: list[tuple[Setting, Companion]] = []
-    for mesh in ask.MESHES:
-        for steps in ask.STEPS:
+    for mesh in MESHES:
+        for steps in STEPS:
             for n in cells:
                 for count in counts:
                     setting = Setting(mesh, steps, n, count)

@@ -153,14 +153,14 @@ def plan_(
     """Choose mesh, grading and steps for an error: the choice, what it will cost, and the alternatives."""
     from mpi4py import MPI
 
-    from warmslip.studies import ask
+    from warmslip.studies import ask, pilots
 
     checked = reader.load(scene, set_)
     first = MPI.COMM_WORLD.rank == 0
     found = ask.plan(checked, relative(error), of, seconds=seconds, say=_say if first else lambda _: None)
     if first:
         typer.echo(ask.text(found))
-        keys = [*(set_ or []), *ask.keys_of(found.choice.scene)]
+        keys = [*(set_ or []), *pilots.keys_of(found.choice.scene)]
         words = ["warmslip", "run", scene, *(word for key in keys for word in ("--set", key))]
         typer.echo(f"run it with: {shlex.join(words)}")
         if checked.time.tolerance is not None and found.choice.scene.time.tolerance is None:

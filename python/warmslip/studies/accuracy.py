@@ -14,7 +14,7 @@ from warmslip.model.loads import Loads
 from warmslip.scene.scene import Scene
 from warmslip.simulation import run as plain
 from warmslip.simulation.run import Observer, Result
-from warmslip.studies import ask
+from warmslip.studies import ask, pilots
 
 
 def run(
@@ -117,7 +117,7 @@ def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | N
         "estimated": answer.error,
         "of": answer.plan.quantities,
         "parts": answer.parts,
-        "setting": ask.keys_of(answer.scene),
+        "setting": pilots.keys_of(answer.scene),
         "predicted": answer.tries[-1].error,
         "tries": len(answer.tries),
         "pilot_seconds": answer.plan.pilot_seconds,

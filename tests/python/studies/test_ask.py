@@ -12,7 +12,7 @@ from support.processes import Command
 import warmslip
 from warmslip import SceneError
 from warmslip.scene.scene import Scene
-from warmslip.studies import ask
+from warmslip.studies import ask, pilots
 from warmslip.studies.companions import Companion, march
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
@@ -65,7 +65,7 @@ def test_singular_corners_ask_for_a_graded_mesh() -> None:
     assert all(one.seconds >= found.choice.seconds for one in found.alternatives if one.met)
     text = ask.text(found)
     assert "graded to the singular corners" in text and "alternatives" in text
-    assert "mesh.graded_to=['corners']" in ask.keys_of(found.choice.scene)
+    assert "mesh.graded_to=['corners']" in pilots.keys_of(found.choice.scene)
 
 
 def test_no_grading_without_a_singular_corner() -> None:
