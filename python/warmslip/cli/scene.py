@@ -27,7 +27,10 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="go on from the newest checkpoint in the folder")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="check and explain the scene, write nothing")] = False,
     estimate: Annotated[
-        bool, typer.Option("--estimate", help="also estimate the errors from coarser companions: three times the cost")
+        bool,
+        typer.Option(
+            "--estimate", help="also estimate the errors from coarser companions: three to eight times the cost"
+        ),
     ] = False,
     error: Annotated[
         str, typer.Option(help="relative error, such as 1%: mesh, grading and steps are chosen for it from pilot runs")

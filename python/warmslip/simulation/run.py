@@ -74,49 +74,9 @@ def run(
     progress: Callable[[int, int, Any], None] | None = None,
     resume: bool = False,
 ) -> Result:
-    """Runs a scene to its end.
+    """Runs a scene to its end, with its own mesh and steps; parameters, result and errors are those of the public `warmslip.run`.
 
-    With `out`, writes trajectory.h5, summary.json and final.vtu there, and checkpoints while it runs. Collective over `comm`.
-
-    Parameters
-    ----------
-    scene : Scene
-        What to run.
-    out : str or Path, optional
-        Folder of the files; without it nothing is written.
-    comm : mpi4py communicator, optional
-        The ranks that run; all by default.
-    loads : Loads, optional
-        Loads in the place of the scene's.
-    laws : dict of Law, optional
-        Contact laws by part, in the place of the scene's.
-    backend : str
-        Factorization: automatic, cholmod or petsc.
-    observers : sequence of callables
-        Called as `observer(state, report)` after every step, on every rank.
-    progress : callable, optional
-        Called as `progress(step, steps, report)` after every step, on rank 0; with a tolerance, `steps` is what is expected.
-    resume : bool
-        Continue from the newest whole checkpoint in `out`. On one process the end is bitwise that of an uninterrupted run; on
-        several it agrees to round-off. Without a checkpoint the run starts from the beginning, unless the same run was
-        completed in `out` before: its result is returned then. Python functions must be given again and must be the same; only
-        their names are compared.
-
-    Returns
-    -------
-    Result
-        Also of a run that stopped early: `outcome` is then one of contact_not_converged, not_finite, data_not_finite,
-        support_inside_foundation, law_failed, balance_violated, precision_lost, unsupported, solver_failed, or interrupted
-        (Ctrl-C, SIGTERM). `failure` in the summary describes the step that was rejected.
-
-    Raises
-    ------
-    TypeError
-        For arguments of another kind.
-    ValueError
-        For a scene, loads or laws that make no sense.
-    OSError
-        When `out` cannot be written.
+    Collective over `comm`.
     """
     refuse_types(scene, loads, laws)  # before anything in the folder is removed
     if callable(observers):

@@ -124,6 +124,6 @@ def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | N
         "seconds": answer.seconds,
     }
     summary = found.summary | {"error": known}
-    if folder is not None and (folder / "summary.json").exists():
+    if folder is not None and answer.simulation.comm.rank == 0:  # one rank has written it
         (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     return replace(found, summary=summary)

@@ -23,6 +23,7 @@ from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import BALANCES
 from warmslip.simulation.summary import petsc_options
+from warmslip.studies import run_numbers
 from warmslip.studies.error_norms import Comparison, Largest
 
 
@@ -51,7 +52,6 @@ def row(simulation: Simulation, errors: dict[str, float] | None) -> dict[str, An
     """One line of the table: errors (blank for the reference), what the run cost, and whether it was right."""
     s, d = simulation.stepper, simulation.discretisation
     cost = {name: getattr(s.cost, name) for name in type(s.cost).items}
-    report, moves = simulation.report, d.problem.moves
     return (
         {
             "n": simulation.scene.mesh.level,
@@ -62,26 +62,16 @@ def row(simulation: Simulation, errors: dict[str, float] | None) -> dict[str, An
         | {f"e_{name}": value for name, value in (errors or dict.fromkeys(Largest().values, float("nan"))).items()}
         | {"outcome": simulation.outcome}
         | {f"residual_{name}": simulation.statistics.residuals[name] for name in BALANCES}
-        | {
-            "norm_u_V": d.norms.v(s.u) if moves else 0.0,
-            "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
-            "norm_w_L2": d.norms.l2(s.w) if moves else 0.0,
-            "norm_theta_L2": d.norms.l2(s.theta) if d.problem.conducts else 0.0,
-        }
+        | run_numbers.norms(simulation)
         | stress_measures(d, s)
+        | run_numbers.contact(simulation)
         | {
-            "normal_force": report.normal_force if report else 0.0,
-            "tangential_force": float(np.linalg.norm(report.friction_traction)) if report else 0.0,
-            "max_penetration": report.max_penetration if report else 0.0,
-            "open": report.open if report else 0,
-            "stick": report.stick if report else 0,
-            "slip": report.slip if report else 0,
             "newton_largest": simulation.statistics.newton_max,
             "safeguarded_steps": sum(
                 count for stage, count in simulation.statistics.stages.items() if stage != "newton"
             ),
             "unknowns": d.unknowns,
-            "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
+            "cpu_seconds": run_numbers.seconds(simulation),
         }
         | cost
     )

@@ -25,6 +25,7 @@ from warmslip.scene.scene import Scene
 from warmslip.scene.structure import structure
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import digits
+from warmslip.studies import run_numbers
 from warmslip.studies.refinement_study import stamp
 
 NAME = "sweep"  # of its files
@@ -108,32 +109,30 @@ class Runner:
 
 def line(simulation: Simulation, scene: Scene) -> tables.Row:
     """What a run leaves, in numbers; those of an absent field are 0 (collective)."""
-    s, d, report = simulation.stepper, simulation.discretisation, simulation.report
+    s, d = simulation.stepper, simulation.discretisation
     moves, conducts = d.problem.moves, d.problem.conducts
     trusted = digits(simulation.statistics.trusted(s.extents))
-    return {
-        "outcome": simulation.outcome,
-        "warnings": len(simulation.warnings()),
-        "time": s.time,
-        "steps": simulation.taken,
-        "norm_u_V": d.norms.v(s.u) if moves else 0.0,
-        "norm_u_L2": d.norms.l2(s.u) if moves else 0.0,
-        "norm_w_L2": d.norms.l2(s.w) if moves else 0.0,
-        "norm_theta_L2": d.norms.l2(s.theta) if conducts else 0.0,
-        "theta_min": s.theta.min()[1] if conducts else 0.0,
-        "theta_max": s.theta.max()[1] if conducts else 0.0,
-        "mises_max": float(d.mises(s).max()) if moves else 0.0,
-        "normal_force": report.normal_force if report else 0.0,
-        "tangential_force": float(np.linalg.norm(report.friction_traction)) if report else 0.0,
-        "max_penetration": report.max_penetration if report else 0.0,
-        "open": report.open if report else 0,
-        "stick": report.stick if report else 0,
-        "slip": report.slip if report else 0,
-        "residual": max(simulation.statistics.residuals.values()),
-        "digits": min(trusted.values(), default=16.0),
-        "cpu_seconds": s.cost.setup_seconds + s.cost.step_seconds,
-        "scene": scene.digest(),
-    }
+    return (
+        {
+            "outcome": simulation.outcome,
+            "warnings": len(simulation.warnings()),
+            "time": s.time,
+            "steps": simulation.taken,
+        }
+        | run_numbers.norms(simulation)
+        | {
+            "theta_min": s.theta.min()[1] if conducts else 0.0,
+            "theta_max": s.theta.max()[1] if conducts else 0.0,
+            "mises_max": float(d.mises(s).max()) if moves else 0.0,
+        }
+        | run_numbers.contact(simulation)
+        | {
+            "residual": max(simulation.statistics.residuals.values()),
+            "digits": min(trusted.values(), default=16.0),
+            "cpu_seconds": run_numbers.seconds(simulation),
+            "scene": scene.digest(),
+        }
+    )
 
 
 def sweep(
