@@ -10,7 +10,8 @@ import pytest
 
 import warmslip
 from warmslip import SceneError, _core
-from warmslip.mesh.refinement import fraction
+from warmslip.mesh import files
+from warmslip.mesh.refinement import Grading, fraction, refined
 from warmslip.model.corners import corners, scalar_exponent
 from warmslip.model.meshes import coarsest, make_mesh
 from warmslip.scene.scene import Scene
@@ -73,6 +74,13 @@ def test_edges_at_a_corner_shrink_by_its_fraction() -> None:
         assert lengths.max() <= 0.25 * np.sqrt(2) * kappa**2 * (1 + 1e-12)
     assert kappa < 2 ** (-1 / 0.69)  # at equality a logarithm is lost
     assert fraction(1.0) == 0.5
+
+
+def test_an_edge_between_two_graded_places_is_halved() -> None:
+    nodes, cells = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]], dtype=np.int32)
+    mesh = files.MeshFile(2, nodes, cells, {}, {}, "")
+    cut = refined(mesh, 1, [Grading(np.array([[0]]), 0.2), Grading(np.array([[1]]), 0.3)]).nodes[3:]
+    assert np.array(sorted(map(tuple, cut))) == pytest.approx(np.array([[0.0, 0.2], [0.5, 0.0], [0.7, 0.3]]), abs=1e-15)
 
 
 def test_layers_along_a_side() -> None:

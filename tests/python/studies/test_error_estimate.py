@@ -12,7 +12,7 @@ from warmslip import SceneError
 from warmslip.records import tables
 from warmslip.scene.scene import Scene
 from warmslip.studies.companions import Companion, march
-from warmslip.studies.error_estimate import estimate
+from warmslip.studies.error_estimate import estimate, richardson
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 # scene, its keys, those of the finer run, and quantities that the estimate must get right within a factor of three
@@ -56,6 +56,15 @@ def test_effectivity(case: str) -> None:
         assert 0.5 <= found.total(quantity) / true.values[quantity] <= 3, (quantity, found.total(quantity), true)
     assert found.work < 12
     assert {row["quantity"] for row in found.rows()} == set(found.quantities)
+
+
+@pytest.mark.parametrize("p", [0.7, 1.0, 1.6])
+def test_the_error_from_a_distance(p: float) -> None:
+    """Errors C h^p: their difference in L2 and of functionals, in the energy norm the root of that of the squares."""
+    fine, coarse = 3.0, 3.0 * 2**p
+    assert richardson("theta_L2", "space", coarse - fine, p) == pytest.approx(fine, rel=1e-12)
+    assert richardson("u_V", "time", coarse - fine, p) == pytest.approx(fine, rel=1e-12)
+    assert richardson("u_V", "space", (coarse**2 - fine**2) ** 0.5, p) == pytest.approx(fine, rel=1e-12)
 
 
 def small(**keys: Any) -> Scene:
