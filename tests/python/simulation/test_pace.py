@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from support.stopped import KilledError, same, scene, stop_after
 
 import warmslip
 from warmslip import Trajectory
+from warmslip.model.discretisation import discretise
 from warmslip.scene.scene import Scene
+from warmslip.simulation.local_error import LocalError
 from warmslip.simulation.pace import FLOOR, AdaptivePace
 
 GRADED = ("time.graded_to=[0.0, 0.4]", "time.steps=16", "time.halvings=3")
@@ -124,6 +127,21 @@ def test_the_error_falls_like_the_root_of_the_tolerance() -> None:
     ]
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.7)
     assert errors[1] / errors[2] == pytest.approx(2.0, abs=0.7)
+
+
+def test_the_estimate_is_half_the_second_derivative() -> None:
+    """Of theta = t^2, at steps of different sizes: k^2/2 times 2, relative to the largest value so far."""
+    d = discretise(cooling())
+    theta = d.layout.vector(1)
+    state = SimpleNamespace(u=None, w=None, theta=theta)
+    error, time = LocalError(d, state, 1.0), 0.0
+    for size, expected in ((0.25, None), (0.5, 0.25 / 0.5625), (0.125, 0.015625 / 0.765625)):
+        error.remember(state)
+        time += size
+        theta.set(time**2)
+        found = error.of(state, size)
+        assert expected is None or found == pytest.approx(expected, rel=1e-12)
+        error.take(size)
 
 
 DROP: dict[str, Any] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,21 @@ def test_the_error_is_what_was_asked_for(case: str) -> None:
     assert true_error(answer.scene, answer.plan.quantities) <= error
     assert len(answer.tries) <= ask.TRIES
     assert answer.seconds >= answer.plan.pilot_seconds > 0
+
+
+def test_a_choice_that_errs_too_much_is_followed_by_a_finer_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = ask._plan
+
+    def too_coarse(*given: Any) -> Any:
+        found, runs = plan(*given)
+        setting = replace(found.choice.setting, steps="equal", count=16)
+        found.choice = replace(found.choice, setting=setting, scene=runs.make(setting))
+        return found, runs
+
+    monkeypatch.setattr(ask, "_plan", too_coarse)
+    answer = ask.solve(warmslip.load("heat_slab"), 0.02, "theta_L2")
+    assert answer.error <= 0.02
+    assert len(answer.tries) >= 2 and answer.tries[-1].setting.count > 16
 
 
 def test_singular_corners_ask_for_a_graded_mesh() -> None:
