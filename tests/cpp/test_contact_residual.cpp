@@ -1,11 +1,13 @@
 // The laws of the contact and their residual at one point.
 #include <doctest/doctest.h>
 
+#include <array>
+#include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bodies.hpp"
-#include "warmslip/contact/minimal_forces.hpp"
 #include "warmslip/contact/residual.hpp"
 
 using namespace warmslip;

@@ -321,7 +321,10 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   }
   const StepInputs inputs = complete(loads, contact);
   StepReport<d> report = conclude(loads, refine(loads, balance(inputs), contact), contact);
-  if (report.outcome != Outcome::completed) return report;
+  if (report.outcome != Outcome::completed) {
+    extents_ = extents_before;  // what was not taken counts in no later step
+    return report;
+  }
   before_->extents = extents_before;
   cost_.substitutions += substitutions() - before;
   return report;

@@ -278,6 +278,15 @@ def test_a_step_is_taken_back_whole() -> None:
     assert np.array_equal(d.field(stepper.u), after)
 
 
+def test_a_step_that_is_not_taken_leaves_no_extents() -> None:
+    """Digits are those of the steps that were taken: a needle has none in its first step."""
+    simulation = warmslip.Simulation(scene("mesh.lengths=[1e-6, 1.0]", "mesh.n=4", "time.steps=4"))
+    before = list(simulation.stepper.extents)
+    assert list(simulation.steps()) == []
+    assert simulation.outcome == "precision_lost"
+    assert list(simulation.stepper.extents) == before
+
+
 def test_factors_are_kept_within_their_bound() -> None:
     simulation = warmslip.Simulation(scene())
     stepper = simulation.stepper
