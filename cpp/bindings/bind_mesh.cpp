@@ -38,6 +38,15 @@ void bind(py::module_& m) {
             return parts;
           },
           "Facets (f, d) of every named boundary part.")
+      .def(
+          "area_normals",
+          [](const Mesh<d>& mesh, const std::string& part) {
+            const Facets<d>& facets = mesh.part(part);
+            RealTable<d> out(facets.nodes.rows(), d);
+            for (Eigen::Index f = 0; f < out.rows(); ++f) out.row(f) = area_normal(mesh, facets, f).transpose();
+            return out;
+          },
+          py::arg("part"), "Outward normals of the facets of a part, (f, d); their lengths are the areas.")
       .def_property_readonly("dim", [](const Mesh<d>&) { return d; });
   m.def(
       "prolongation", [](const Mesh<d>& coarse, const Mesh<d>& fine) { return prolongation<d>(coarse, fine); },

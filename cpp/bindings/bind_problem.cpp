@@ -37,21 +37,34 @@ void bind(py::module_& m) {
             return std::array{m.out_of_plane.elastic, m.out_of_plane.viscous, m.out_of_plane.expansion};
           },
           "what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz");
+  using S = PartSprings<d>;
+  py::class_<S>(m, name<d>("PartSprings").c_str(), "Springs and dashpots on a part.")
+      .def(py::init([](std::string part, Point<d> stiffness, double normal_stiffness, Point<d> damping,
+                       double normal_damping) {
+             return S{std::move(part), {stiffness, normal_stiffness}, {damping, normal_damping}};
+           }),
+           py::kw_only(), py::arg("part"), py::arg("stiffness"), py::arg("normal_stiffness"), py::arg("damping"),
+           py::arg("normal_damping"), "Traction -(stiffness u + damping w), along the axes and along the normal.");
   using P = Problem<d>;
   py::class_<P, std::shared_ptr<P>>(m, name<d>("Problem").c_str(), "A mesh with materials, supports and contact parts.")
-      .def(
-          py::init([](std::shared_ptr<Mesh<d>> mesh, std::vector<M> materials, std::vector<int> regions,
-                      std::vector<std::string> prescribed_displacement, std::vector<std::string> prescribed_temperature,
-                      std::vector<ContactPart> contacts, bool lumped) {
-            return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions),
-                                         std::move(prescribed_displacement), std::move(prescribed_temperature),
-                                         std::move(contacts), lumped});
-          }),
-          py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("prescribed_displacement"),
-          py::arg("prescribed_temperature"), py::arg("contacts"), py::arg("lumped"),
-          "`regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` "
-          "are parts with given u and theta; "
-          "`lumped` makes capacity and exchange diagonal.")
+      .def(py::init([](std::shared_ptr<Mesh<d>> mesh, std::vector<M> materials, std::vector<int> regions,
+                       std::vector<std::string> prescribed_displacement,
+                       std::vector<std::string> prescribed_temperature, std::vector<ContactPart> contacts, bool lumped,
+                       std::vector<std::pair<Index, Tensor2<d>>> held_nodes, std::vector<PartSprings<d>> springs) {
+             std::vector<HeldNode<d>> held;
+             for (const auto& [node, directions] : held_nodes) held.push_back({node, directions});
+             return std::make_shared<P>(P{std::move(mesh), std::move(materials), std::move(regions),
+                                          std::move(prescribed_displacement), std::move(prescribed_temperature),
+                                          std::move(contacts), std::move(held), std::move(springs), lumped});
+           }),
+           py::kw_only(), py::arg("mesh"), py::arg("materials"), py::arg("regions"), py::arg("prescribed_displacement"),
+           py::arg("prescribed_temperature"), py::arg("contacts"), py::arg("lumped"),
+           py::arg("held_nodes") = std::vector<std::pair<Index, Tensor2<d>>>{},
+           py::arg("springs") = std::vector<PartSprings<d>>{},
+           "`regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` "
+           "are parts with given u and theta; "
+           "`lumped` makes capacity and exchange diagonal; `held_nodes` are pairs of a node and the projector onto the "
+           "directions in which its displacement is given.")
       .def_property_readonly("mesh", [](const P& p) { return std::const_pointer_cast<Mesh<d>>(p.mesh); })
       .def_readonly("materials", &P::materials)
       .def_property_readonly(

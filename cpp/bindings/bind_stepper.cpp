@@ -91,13 +91,15 @@ void bind(py::module_& m) {
       .def(
           "advance",
           [](S& s, const Maybe& force, const Maybe& heat, const Eigen::VectorXd& gap, const Maybe& velocity,
-             const Maybe& temperature, const Eigen::VectorXd& foundation, bool measured, double time) {
+             const Maybe& temperature, const Eigen::VectorXd& foundation, const Eigen::VectorXd& foundation_velocity,
+             bool measured, double time) {
             return s.advance({force.value_or(nullptr), heat.value_or(nullptr), gap, velocity.value_or(nullptr),
-                              temperature.value_or(nullptr), foundation, measured, time});
+                              temperature.value_or(nullptr), foundation, foundation_velocity, measured, time});
           },
           py::arg("force"), py::arg("heat"), py::arg("gap"), py::arg("support_velocity") = py::none(),
           py::arg("support_temperature") = py::none(), py::arg("foundation") = Eigen::VectorXd(),
-          py::arg("measured") = false, py::arg("time") = std::numeric_limits<double>::quiet_NaN(),
+          py::arg("foundation_velocity") = Eigen::VectorXd(), py::arg("measured") = false,
+          py::arg("time") = std::numeric_limits<double>::quiet_NaN(),
           "One step; the state stays when the outcome is not completed. See StepLoads.")
       .def_property_readonly(
           "u", [](const S& s) { return share(s.level().u); },
@@ -116,6 +118,9 @@ void bind(py::module_& m) {
           "rigid", [](const S& s) { return s.level().rigid; },
           "Velocities of the rigid motions of a body without supports, along motions that the mesh gives.")
       .def_property_readonly("time", &S::time)
+      .def_property_readonly(
+          "reactions", [](const S& s) { return share(s.reactions()); },
+          "Forces of the supports on the body at the nodes in the step that was evaluated last, force.")
       .def_property_readonly(
           "contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")
       .def_property_readonly(
@@ -217,6 +222,7 @@ void bind_stepper(py::module_& m) {
   term("expansion_work", &Balances::expansion_work);
   term("gap_work", &Balances::gap_work);
   term("support_work", &Balances::support_work);
+  term("foundation_work", &Balances::foundation_work);
   term("heat_change", &Balances::heat_change);
   term("heat_damping", &Balances::heat_damping);
   term("conducted", &Balances::conducted);

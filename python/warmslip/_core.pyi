@@ -90,6 +90,10 @@ class Mesh2:
         """
         Facets (f, d) of every named boundary part.
         """
+    def area_normals(self, part: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        Outward normals of the facets of a part, (f, d); their lengths are the areas.
+        """
 class Mesh3:
     """
     Simplicial mesh with named boundary parts.
@@ -121,6 +125,10 @@ class Mesh3:
     def parts(self) -> dict[str, typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]]:
         """
         Facets (f, d) of every named boundary part.
+        """
+    def area_normals(self, part: str) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        Outward normals of the facets of a part, (f, d); their lengths are the areas.
         """
 class NormalCompliance:
     """
@@ -207,13 +215,21 @@ class Material2:
     @property
     def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
+class PartSprings2:
+    """
+    Springs and dashpots on a part.
+    """
+    def __init__(self, *, part: str, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], normal_stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], normal_damping: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Traction -(stiffness u + damping w), along the axes and along the normal.
+        """
 class Problem2:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
+    def __init__(self, *, mesh: Mesh2, materials: collections.abc.Sequence[Material2], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool, held_nodes: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"]]] = ..., springs: collections.abc.Sequence[PartSprings2] = ...) -> None:
         """
-        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
+        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal; `held_nodes` are pairs of a node and the projector onto the directions in which its displacement is given.
         """
     @property
     def conducts(self) -> bool:
@@ -276,13 +292,21 @@ class Material3:
     @property
     def viscosity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"] | None:
         ...
+class PartSprings3:
+    """
+    Springs and dashpots on a part.
+    """
+    def __init__(self, *, part: str, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], normal_stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], normal_damping: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Traction -(stiffness u + damping w), along the axes and along the normal.
+        """
 class Problem3:
     """
     A mesh with materials, supports and contact parts.
     """
-    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool) -> None:
+    def __init__(self, *, mesh: Mesh3, materials: collections.abc.Sequence[Material3], regions: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], prescribed_displacement: collections.abc.Sequence[str], prescribed_temperature: collections.abc.Sequence[str], contacts: collections.abc.Sequence[ContactPart], lumped: bool, held_nodes: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]]] = ..., springs: collections.abc.Sequence[PartSprings3] = ...) -> None:
         """
-        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal.
+        `regions` is the material of every cell, or empty; `prescribed_displacement` and `prescribed_temperature` are parts with given u and theta; `lumped` makes capacity and exchange diagonal; `held_nodes` are pairs of a node and the projector onto the directions in which its displacement is given.
         """
     @property
     def conducts(self) -> bool:
@@ -980,7 +1004,7 @@ class Balances:
     """
     Terms and relative residuals of the balances of one step.
     """
-    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'support_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'friction_heating', 'held', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'force_defect', 'heat_defect', 'force_scale')
+    terms: typing.ClassVar[tuple[str, ...]] = ('kinetic', 'elastic', 'contact', 'kinetic_change', 'elastic_change', 'contact_change', 'inertia_damping', 'elastic_damping', 'contact_damping', 'viscous', 'friction', 'load_work', 'expansion_work', 'gap_work', 'support_work', 'foundation_work', 'heat_change', 'heat_damping', 'conducted', 'exchanged', 'supplied', 'heating', 'friction_heating', 'held', 'energy_residual', 'heat_residual', 'force_residual', 'law_residual', 'force_defect', 'heat_defect', 'force_scale')
     @property
     def conducted(self) -> float:
         ...
@@ -1067,6 +1091,9 @@ class Balances:
         ...
     @property
     def support_work(self) -> float:
+        ...
+    @property
+    def foundation_work(self) -> float:
         ...
     @property
     def viscous(self) -> float:
@@ -1190,7 +1217,7 @@ class Stepper2:
         """
         For a problem that differs in loads, contact laws and initial data alone; shares the factors of `like`.
         """
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport2:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., foundation_velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport2:
         """
         One step; the state stays when the outcome is not completed. See StepLoads.
         """
@@ -1241,6 +1268,11 @@ class Stepper2:
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         (d points, d points), velocity per force; rigid motions apart where the body has no support
+        """
+    @property
+    def reactions(self) -> petsc4py.PETSc.Vec:
+        """
+        Forces of the supports on the body at the nodes in the step that was evaluated last, force.
         """
     @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -1401,7 +1433,7 @@ class Stepper3:
         """
         For a problem that differs in loads, contact laws and initial data alone; shares the factors of `like`.
         """
-    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport3:
+    def advance(self, force: petsc4py.PETSc.Vec | None, heat: petsc4py.PETSc.Vec | None, gap: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], support_velocity: petsc4py.PETSc.Vec | None = None, support_temperature: petsc4py.PETSc.Vec | None = None, foundation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., foundation_velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ..., measured: bool = False, time: typing.SupportsFloat | typing.SupportsIndex = ...) -> StepReport3:
         """
         One step; the state stays when the outcome is not completed. See StepLoads.
         """
@@ -1452,6 +1484,11 @@ class Stepper3:
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         (d points, d points), velocity per force; rigid motions apart where the body has no support
+        """
+    @property
+    def reactions(self) -> petsc4py.PETSc.Vec:
+        """
+        Forces of the supports on the body at the nodes in the step that was evaluated last, force.
         """
     @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:

@@ -44,7 +44,7 @@ bool dependent(const Eigen::SparseMatrix<double, Eigen::RowMajor>& rows) {
 template <int d>
 ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& problem) : layout_(layout) {
   const Mesh<d>& mesh = layout.mesh();
-  const std::set<Index> fixed = nodes_of(mesh, problem.prescribed_displacement);
+  const std::map<Index, Tensor2<d>> supports = held_directions(problem);
   std::vector<std::string> touching;
   for (const ContactPart& contact : problem.contacts)
     if (contact.law) touching.push_back(contact.part);
@@ -53,9 +53,22 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
     number[node] = static_cast<Eigen::Index>(nodes_.size());
     nodes_.push_back(node);
   }
-  free_ = Eigen::VectorXd::Ones(nodes() * d);
-  for (Eigen::Index i = 0; i < nodes(); ++i)
-    if (fixed.contains(nodes_[static_cast<std::size_t>(i)])) free_.segment<d>(i * d).setZero();
+  const auto held_at = [&](Index node) -> Tensor2<d> {
+    const auto found = supports.find(node);
+    return found == supports.end() ? Tensor2<d>(Tensor2<d>::Zero()) : found->second;
+  };
+  std::vector<bool> fixed;
+  std::vector<Eigen::Triplet<double>> free;
+  for (const Index node : nodes_) {
+    const auto row = static_cast<int>(fixed.size()) * d;
+    const Tensor2<d> left = Tensor2<d>::Identity() - held_at(node);
+    fixed.push_back(left.isZero(0));
+    for (int a = 0; a < d; ++a)
+      for (int b = 0; b < d; ++b)
+        if (left(a, b) != 0) free.emplace_back(row + a, row + b, left(a, b));
+  }
+  free_.resize(nodes() * d, nodes() * d);
+  free_.setFromTriplets(free.begin(), free.end());
 
   std::vector<Point<d>> positions, normals;
   std::vector<double> weights;
@@ -114,13 +127,23 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   }
   shape_.resize(count * d, nodes() * d);
   shape_.setFromTriplets(shape.begin(), shape.end());
-  const Eigen::VectorXd moves = shape_ * free_;
-  for (Eigen::Index i = 0; i < count; ++i) prescribed_.push_back(moves.segment<d>(i * d).isZero(0));
   scalar_shape_.resize(count, nodes());
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
-
   moving_shape_ = scalar_shape_;
-  moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return free_[node * d] != 0; });
+  moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return !fixed[static_cast<std::size_t>(node)]; });
+  held_ = Eigen::MatrixXd::Zero(count * d, d);
+  for (Eigen::Index q = 0; q < count; ++q) {
+    prescribed_.push_back(moving_shape_.innerVector(q).nonZeros() == 0);
+    Tensor2<d> held = Tensor2<d>::Zero();
+    bool first = true;  // a direction is held where all nodes about the point hold it
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(scalar_shape_, q); entry; ++entry) {
+      const Tensor2<d> here = held_at(nodes_[static_cast<std::size_t>(entry.col())]);
+      if (!first && !here.isApprox(held)) held.setZero();
+      if (first) held = here;
+      first = false;
+    }
+    if (!prescribed_.back()) held_.template middleRows<d>(q * d) = held;
+  }
 
   shares_ = dependent(moving_shape_);
 
@@ -128,7 +151,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];
   own_nodes_.assign(static_cast<std::size_t>(count), -1);
   for (const auto& entry : scalar_shape)
-    if (entry.value() == 1 && touched[static_cast<std::size_t>(entry.col())] == 1 && !prescribed(entry.row()))
+    if (entry.value() == 1 && touched[static_cast<std::size_t>(entry.col())] == 1 && !prescribed(entry.row()) &&
+        (held_.template middleRows<d>(entry.row() * d) * normals_.row(entry.row()).transpose()).isZero(1e-14))
       own_nodes_[static_cast<std::size_t>(entry.row())] = entry.col();
 }
 
@@ -178,6 +202,16 @@ Eigen::VectorXd ContactSurface<d>::at_points(const Eigen::VectorXd& nodal) const
 }
 
 template <int d>
+Eigen::VectorXd ContactSurface<d>::tangential(const Eigen::VectorXd& vectors) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(points() * d);
+  for (Eigen::Index q = 0; q < points() && vectors.size() > 0; ++q) {
+    const Point<d> nu = normals_.row(q).transpose(), here = vectors.segment<d>(q * d);
+    out.segment<d>(q * d) = here - here.dot(nu) * nu;
+  }
+  return out;
+}
+
+template <int d>
 Eigen::VectorXd ContactSurface<d>::nodal_mean(const Eigen::VectorXd& values) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(nodes()), weight = sum,
                   low = Eigen::VectorXd::Constant(nodes(), INFINITY), high = -low;
@@ -194,14 +228,19 @@ Eigen::VectorXd ContactSurface<d>::nodal_mean(const Eigen::VectorXd& values) con
 
 template <int d>
 Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const {
-  return (shape_.transpose() * forces).cwiseProduct(free_);
+  return free_ * (shape_.transpose() * forces);
 }
 
 template <int d>
 Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) const {
-  const Eigen::MatrixXd free = free_.asDiagonal() * compliance * free_.asDiagonal();
+  constexpr double lent = 1e-3;
+  const Eigen::MatrixXd free = (free_ * compliance) * free_;
   const Eigen::MatrixXd half = shape_ * free;
-  return half * shape_.transpose();
+  Eigen::MatrixXd out = half * shape_.transpose();
+  for (Eigen::Index q = 0; q < points(); ++q)
+    out.template block<d, d>(q * d, q * d) +=
+        lent * out.template block<d, d>(q * d, q * d).trace() * held_.template middleRows<d>(q * d);
+  return out;
 }
 
 template <int d>

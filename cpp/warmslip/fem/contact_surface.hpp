@@ -27,7 +27,10 @@ class ContactSurface {
   /// Whether the displacement of all nodes about a point is prescribed.
   bool prescribed(Eigen::Index point) const { return prescribed_[static_cast<std::size_t>(point)]; }
 
-  /// The node whose velocity is that of a point and of no other, and is not prescribed; -1 where there is none.
+  /// Nodal values, (d nodes), without the directions that supports hold.
+  Eigen::VectorXd released(const Eigen::VectorXd& nodal) const { return free_ * nodal; }
+
+  /// The node whose velocity is that of a point and of no other, and is not held across it; -1 where there is none.
   Eigen::Index own_node(Eigen::Index point) const { return own_nodes_[static_cast<std::size_t>(point)]; }
   /// Adds nodal values, (d nodes), to a displacement-like vector.
   void add(const Eigen::VectorXd& nodal, Vec v) const;
@@ -42,12 +45,16 @@ class ContactSurface {
   const std::vector<Index>& mesh_nodes() const { return nodes_; }  ///< the contact nodes in the mesh's numbering
   /// Values at the contact points, (d points), of nodal ones, (d nodes).
   Eigen::VectorXd at_points(const Eigen::VectorXd& nodal) const;
+  /// The tangential parts of vectors at the points, (d points); zeros for none.
+  Eigen::VectorXd tangential(const Eigen::VectorXd& vectors) const;
   /// Means over the points about every node, (nodes), of values at the points, (points); no more and no less than
   /// these.
   Eigen::VectorXd nodal_mean(const Eigen::VectorXd& values) const;
   /// Forces at the points as nodal forces, without those that a support takes, (d nodes).
   Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
-  /// Compliance of the points from that of the nodes; a node whose displacement is prescribed has none.
+  /// Compliance of the points from that of the nodes; a node whose displacement is prescribed has none. In directions
+  /// in which supports hold a point and leave others free, it gets a thousandth of the compliance that it has in the
+  /// latter, so that the law has one answer there: without a motion, no force along them.
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
   /// The same for scalars, one value a node and a point: (points, nodes).
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
@@ -63,7 +70,8 @@ class ContactSurface {
   std::vector<bool> prescribed_;
   std::vector<Eigen::Index> own_nodes_;
   bool shares_ = false;
-  Eigen::VectorXd free_;  // (d nodes), 0 where the displacement is prescribed and 1 elsewhere
+  Eigen::SparseMatrix<double, Eigen::RowMajor> free_;  // (d nodes, d nodes), projects onto directions that are not held
+  Eigen::MatrixXd held_;  // (d points, d), projectors onto the directions in which a point is held and others are free
   Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_, moving_shape_;
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
   RealTable<d> positions_, normals_;

@@ -11,13 +11,15 @@ namespace {
 template <int rows, int cols>
 using RowMajor = Eigen::Matrix<double, rows, cols, Eigen::RowMajor>;
 
-// a = sum over the rank's cells of kernel(simplex, material)
-template <int d, class Kernel>
-MatHandle assemble(const Layout<d>& layout, const Problem<d>& problem, int rows, int cols, Kernel&& kernel) {
+// a = sum over the rank's cells of kernel(simplex, material), each block changed by `change`(cell, block)
+template <int d, class Kernel, class Change = std::nullptr_t>
+MatHandle assemble(const Layout<d>& layout, const Problem<d>& problem, int rows, int cols, Kernel&& kernel,
+                   Change&& change = nullptr) {
   MatHandle a = layout.matrix(rows, cols);
   for (Eigen::Index c = 0; c < layout.cells(); ++c) {
     const Index cell = layout.mesh_cells()[static_cast<std::size_t>(c)];
-    const auto block = kernel(simplex<d>(vertices(layout.mesh(), cell)), problem.material(cell));
+    auto block = kernel(simplex<d>(vertices(layout.mesh(), cell)), problem.material(cell));
+    if constexpr (requires { change(cell, block); }) change(cell, block);
     using Block = std::decay_t<decltype(block)>;
     const RowMajor<Block::RowsAtCompileTime, Block::ColsAtCompileTime> values = block;
     layout.add(a, c, values.data());
@@ -88,22 +90,112 @@ void add_exchange(const Layout<d>& layout, const Problem<d>& problem, double fac
   }
 }
 
-// Owned global scalar indices of the nodes of `parts`, `block` unknowns a node.
+// Whether this rank owns a node.
 template <int d>
-std::vector<PetscInt> fixed(const Layout<d>& layout, const std::vector<std::string>& parts, int block) {
+bool owns(const Layout<d>& layout, Index node) {
+  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0, global = layout.global_of(node);
+  return global >= first && global < first + layout.owned();
+}
+
+// Owned global nodes of `parts`.
+template <int d>
+std::vector<PetscInt> owned_nodes(const Layout<d>& layout, const std::vector<std::string>& parts) {
   std::set<Index> nodes;
   for (const auto& name : parts) {
     const auto& facets = layout.mesh().part(name);
     nodes.insert(facets.nodes.data(), facets.nodes.data() + facets.nodes.size());
   }
-  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   std::vector<PetscInt> indices;
-  for (const Index node : nodes) {
-    const PetscInt global = layout.global_of(node);
-    if (global < first || global >= first + layout.owned()) continue;
-    for (int a = 0; a < block; ++a) indices.push_back(global * block + a);
-  }
+  for (const Index node : nodes)
+    if (owns(layout, node)) indices.push_back(layout.global_of(node));
   return indices;
+}
+
+// Parts the held directions of the nodes into components, owned scalar indices, and those that lie askew to the axes.
+template <int d>
+void hold(const Layout<d>& layout, const Problem<d>& problem, Operators<d>& operators) {
+  for (const auto& [node, held] : held_directions(problem)) {
+    Tensor2<d> askew = held;
+    for (int a = 0; a < d; ++a) {
+      if (held(a, a) != 1) continue;
+      if (owns(layout, node)) operators.prescribed_displacement.push_back(layout.global_of(node) * d + a);
+      askew.row(a).setZero();
+      askew.col(a).setZero();
+    }
+    if (!askew.isZero(0)) operators.inclined.push_back({node, askew});
+  }
+}
+
+// The momentum's block of a cell, `width` unknowns a node, without the held directions of inclined nodes.
+template <int d, class Block>
+void release(const Layout<d>& layout, const std::map<Index, Tensor2<d>>& inclined, Index cell, int width,
+             Block& block) {
+  for (int i = 0; i <= d; ++i) {
+    const auto found = inclined.find(layout.mesh().cells(cell, i));
+    if (found == inclined.end()) continue;
+    const Tensor2<d> free = Tensor2<d>::Identity() - found->second;
+    block.template middleRows<d>(i * width) = (free * block.template middleRows<d>(i * width)).eval();
+    block.template middleCols<d>(i * width) = (block.template middleCols<d>(i * width) * free).eval();
+  }
+}
+
+template <int d>
+std::map<Index, Tensor2<d>> by_node(const std::vector<HeldNode<d>>& nodes) {
+  std::map<Index, Tensor2<d>> out;
+  for (const HeldNode<d>& one : nodes) out[one.node] = one.held;
+  return out;
+}
+
+// Adds factor * int v . S w over the facets on springs, or on dashpots, to a matrix with `width` unknowns a node.
+template <int d>
+void add_springs(const Layout<d>& layout, const Problem<d>& problem, double stiffness, double damping,
+                 const std::map<Index, Tensor2<d>>& inclined, int width, Mat a) {
+  for (const PartSprings<d>& springs : problem.springs) {
+    const Facets<d>& facets = layout.mesh().part(springs.part);
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+      if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
+      const Point<d> area = area_normal(layout.mesh(), facets, f), nu = area.normalized();
+      const Tensor2<d> tensor = stiffness * springs.stiffness.on(nu) + damping * springs.damping.on(nu);
+      const Eigen::Matrix<double, d, d> mass = warmslip::mass<d>(area.norm());
+      RowMajor<d * d, d * d> values;
+      std::array<PetscInt, static_cast<std::size_t>(d * d)> unknowns;
+      std::array<Tensor2<d>, static_cast<std::size_t>(d)> free;
+      for (int i = 0; i < d; ++i) {
+        const auto found = inclined.find(facets.nodes(f, i));
+        free[static_cast<std::size_t>(i)] = Tensor2<d>::Identity();
+        if (found != inclined.end()) free[static_cast<std::size_t>(i)] -= found->second;
+        for (int c = 0; c < d; ++c)
+          unknowns[static_cast<std::size_t>(i * d + c)] = layout.global_of(facets.nodes(f, i)) * width + c;
+      }
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j < d; ++j)
+          values.template block<d, d>(i * d, j * d) =
+              mass(i, j) * free[static_cast<std::size_t>(i)] * tensor * free[static_cast<std::size_t>(j)];
+      WARMSLIP_PETSC(MatSetValues(a, d * d, unknowns.data(), d * d, unknowns.data(), values.data(), ADD_VALUES));
+    }
+  }
+}
+
+// Adds s P at the inclined nodes; s is the largest diagonal entry of the node.
+template <int d>
+void add_held(const Layout<d>& layout, const std::vector<HeldNode<d>>& inclined, int width, Mat a) {
+  if (inclined.empty()) return;
+  VecHandle diagonal;
+  WARMSLIP_PETSC(MatCreateVecs(a, diagonal.out(), nullptr));
+  WARMSLIP_PETSC(MatGetDiagonal(a, diagonal));
+  {
+    Values entries(diagonal);
+    for (const HeldNode<d>& one : inclined) {
+      if (!owns(layout, one.node)) continue;
+      const PetscInt first = (layout.global_of(one.node) - layout.global_nodes()[0]) * width;
+      const double scale = (*entries).template segment<d>(first).maxCoeff();
+      for (int i = 0; i < d; ++i)
+        for (int j = 0; j < d; ++j)
+          WARMSLIP_PETSC(MatSetValue(a, layout.global_of(one.node) * width + i, layout.global_of(one.node) * width + j,
+                                     scale * one.held(i, j), ADD_VALUES));
+    }
+  }
+  layout.assemble(a);
 }
 
 void fix(Mat a, const std::vector<PetscInt>& indices) {
@@ -123,13 +215,25 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
     });
     WARMSLIP_PETSC(MatCreateMAIJ(scalar, d, inertia.out()));
   }
-  if (has(&M::elasticity))
+  const auto sprung = [&](auto tensor) {
+    return std::any_of(problem.springs.begin(), problem.springs.end(), [&](auto& s) { return (s.*tensor).present(); });
+  };
+  const bool on_springs = sprung(&PartSprings<d>::stiffness), on_dashpots = sprung(&PartSprings<d>::damping);
+  if (has(&M::elasticity) || on_springs)
     elasticity = assemble(layout, problem, d, d,
                           [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.elasticity)); });
-  if (has(&M::viscosity))
+  if (has(&M::viscosity) || on_dashpots)
     viscosity = assemble(layout, problem, d, d,
                          [](const S& s, const M& m) { return strain_energy<d>(s, or_zero(m.viscosity)); });
-  if (problem.moves()) prescribed_displacement = fixed(layout, problem.prescribed_displacement, d);
+  const auto add_to = [&](MatHandle& whole, MatHandle& part, double stiffness, double damping) {
+    part = layout.matrix(d, d);
+    add_springs(layout, problem, stiffness, damping, {}, d, part);
+    layout.assemble(part);
+    WARMSLIP_PETSC(MatAXPY(whole, 1, part, SUBSET_NONZERO_PATTERN));
+  };
+  if (on_springs) add_to(elasticity, springs, 1, 0);
+  if (on_dashpots) add_to(viscosity, dashpots, 0, 1);
+  if (problem.moves()) hold(layout, problem, *this);
   if (!problem.conducts()) return;
   mass = assemble(layout, problem, 1, 1,
                   [&](const S& s, const M& m) { return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval(); });
@@ -149,15 +253,37 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
     add_exchange(layout, problem, 1, 1, 0, exchange);
     layout.assemble(exchange);
   }
-  prescribed_temperature = fixed(layout, problem.prescribed_temperature, 1);
+  prescribed_temperature = owned_nodes(layout, problem.prescribed_temperature);
 }
 
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k) {
-  MatHandle a =
-      assemble(layout, problem, d, d, [k](const Simplex<d>& s, const Material<d>& m) { return momentum<d>(s, m, k); });
+  const auto inclined = by_node(operators.inclined);
+  MatHandle a = assemble(
+      layout, problem, d, d, [k](const Simplex<d>& s, const Material<d>& m) { return momentum<d>(s, m, k); },
+      [&](Index cell, auto& block) { release(layout, inclined, cell, d, block); });
+  if (!problem.springs.empty()) {
+    add_springs(layout, problem, k, 1, inclined, d, a);
+    layout.assemble(a);
+  }
+  add_held(layout, operators.inclined, d, a);
   fix(a, operators.prescribed_displacement);
   return a;
+}
+
+template <int d>
+Eigen::VectorXd support_scales(const Layout<d>& layout, const Operators<d>& operators, Mat a, int width) {
+  Eigen::VectorXd scales = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(operators.inclined.size()));
+  for (Eigen::Index i = 0; i < scales.size(); ++i) {
+    const HeldNode<d>& one = operators.inclined[static_cast<std::size_t>(i)];
+    if (!owns(layout, one.node)) continue;
+    std::array<PetscInt, d> unknowns;
+    for (int c = 0; c < d; ++c) unknowns[static_cast<std::size_t>(c)] = layout.global_of(one.node) * width + c;
+    RowMajor<d, d> block;
+    WARMSLIP_PETSC(MatGetValues(a, d, unknowns.data(), d, unknowns.data(), block.data()));
+    scales[i] = (one.held * block).trace() / one.held.trace();
+  }
+  return scales.size() ? layout.sum(std::move(scales)) : scales;
 }
 
 template <int d>
@@ -175,7 +301,8 @@ template <int d>
 MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k,
                          double scale) {
   constexpr int b = d + 1;
-  MatHandle a = assemble(layout, problem, b, b, [&](const Simplex<d>& s, const Material<d>& m) {
+  const auto inclined = by_node(operators.inclined);
+  const auto coupled = [&](const Simplex<d>& s, const Material<d>& m) {
     const VectorBlock<d> motion = momentum<d>(s, m, k);
     const MixedBlock<d> expansion = coupling<d>(s, or_zero(m.expansion)), heating = coupling<d>(s, or_zero(m.heating));
     const ScalarBlock<d> heat =
@@ -189,9 +316,13 @@ MatHandle coupled_matrix(const Layout<d>& layout, const Problem<d>& problem, con
         block(i * b + d, j * b + d) = scale * heat(i, j);
       }
     return block;
-  });
+  };
+  MatHandle a = assemble(layout, problem, b, b, coupled,
+                         [&](Index cell, auto& block) { release(layout, inclined, cell, b, block); });
   add_exchange(layout, problem, scale, b, d, a);
+  add_springs(layout, problem, k, 1, inclined, b, a);
   layout.assemble(a);
+  add_held(layout, operators.inclined, b, a);
   std::vector<PetscInt> indices;
   for (const PetscInt i : operators.prescribed_displacement) indices.push_back(i / d * b + i % d);
   for (const PetscInt i : operators.prescribed_temperature) indices.push_back(i * b + d);
@@ -224,6 +355,7 @@ std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem) {
 #define WARMSLIP_INSTANTIATE(d)                                                                                   \
   template struct Operators<d>;                                                                                   \
   template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double);        \
+  template Eigen::VectorXd support_scales<d>(const Layout<d>&, const Operators<d>&, Mat, int);                    \
   template MatHandle heat_matrix<d>(const Operators<d>&, double);                                                 \
   template MatHandle coupled_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double, double); \
   template std::pair<double, Symmetry> coupled_symmetry<d>(const Problem<d>&);

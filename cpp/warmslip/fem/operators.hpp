@@ -17,8 +17,10 @@ struct Operators {
   Operators(const Layout<d>& layout, const Problem<d>& problem);
 
   MatHandle inertia;                              ///< rho (w, v), one scalar matrix for all components
-  MatHandle elasticity;                           ///< a(u, v)
-  MatHandle viscosity;                            ///< b(w, v)
+  MatHandle springs;                              ///< int v . S u over parts on springs
+  MatHandle dashpots;                             ///< int v . S w over parts on dashpots
+  MatHandle elasticity;                           ///< a(u, v), springs included
+  MatHandle viscosity;                            ///< b(w, v), dashpots included
   MatHandle mass;                                 ///< (theta, eta) times the capacity, lumped where the problem says so
   MatHandle conductivity;                         ///< d(theta, eta)
   MatHandle expansion;                            ///< m(theta, v): rows v, columns theta
@@ -26,12 +28,21 @@ struct Operators {
   MatHandle exchange;                             ///< int k_c theta eta over Gamma_C, as the mass
   VecHandle reference;                            ///< m(reference temperature, v); null where that is 0
   std::vector<PetscInt> prescribed_displacement;  ///< global scalar indices with given displacement, owned by this rank
-  std::vector<PetscInt> prescribed_temperature;   ///< global nodes with given temperature, owned by this rank
+  /// Nodes that are held in directions beside the axes, the same on every rank; `held` leaves out what is prescribed by
+  /// component.
+  std::vector<HeldNode<d>> inclined;
+  std::vector<PetscInt> prescribed_temperature;  ///< global nodes with given temperature, owned by this rank
 };
 
-/// rho M / k + B + k A with the rows and columns of prescribed displacements replaced by the identity.
+/// rho M / k + B + k A with the rows and columns of prescribed displacements replaced by the identity. At an inclined
+/// node with the projector P, its rows and columns are multiplied by I - P, and s P is added, s being of the size of
+/// the node's own entries.
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k);
+
+/// The factors s of the inclined nodes in a matrix with `width` unknowns a node (collective).
+template <int d>
+Eigen::VectorXd support_scales(const Layout<d>& layout, const Operators<d>& operators, Mat a, int width);
 
 /// M / k + D + J with the rows and columns of prescribed temperatures replaced by the identity.
 template <int d>

@@ -49,6 +49,24 @@ Eigen::MatrixXd motions_of(const Mesh<d>& mesh, const std::vector<Index>& nodes,
   return out;
 }
 
+// The motions, (block nodes, motions), that linear forms of some nodes' values, by number, leave alone.
+Eigen::MatrixXd unresisted(Eigen::MatrixXd z, const std::vector<Index>& nodes, const RigidMotions::Resisted& resisted,
+                           const std::vector<std::size_t>& forms) {
+  if (forms.empty()) return z;
+  constexpr double rounding = 1e-12;
+  const Eigen::Index motions = z.cols(), block = z.rows() / static_cast<Eigen::Index>(nodes.size());
+  Eigen::MatrixXd products(static_cast<Eigen::Index>(forms.size()), motions);
+  for (std::size_t i = 0; i < forms.size(); ++i) {
+    const auto at = std::lower_bound(nodes.begin(), nodes.end(), resisted.nodes[forms[i]]) - nodes.begin();
+    products.row(static_cast<Eigen::Index>(i)) =
+        resisted.rows[forms[i]].transpose() * z.middleRows(static_cast<Eigen::Index>(at) * block, block);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> found(products.transpose() * products);
+  Eigen::Index kept = 0;  // eigenvalues are squares, and come in rising order
+  while (kept < motions && found.eigenvalues()[kept] <= rounding * static_cast<double>(forms.size())) ++kept;
+  return z * found.eigenvectors().leftCols(kept);
+}
+
 // The unknowns of a motion in a vector of the operator, whose further ones of a node come after them.
 void take_part(Vec whole, Vec part) {
   const Eigen::Index width = block_size(whole), block = block_size(part);
@@ -67,28 +85,29 @@ void put_part(Vec part, Vec whole) {
 }  // namespace
 
 template <int d>
-RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
+RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const Resisted& resisted,
                            const std::vector<std::string>& avoid, const Eigen::VectorXd& firmness)
     : right_(layout.vector(width)) {
   const Mesh<d>& mesh = layout.mesh();
   const std::vector<Index> root = connected(mesh);
-  std::vector<bool> held(root.size(), false), avoided(root.size(), false);
-  const auto mark = [&](const std::vector<std::string>& parts, std::vector<bool>& marks, bool whole) {
-    for (const auto& name : parts)
-      for (const Index node : mesh.part(name).nodes.reshaped())
-        marks[static_cast<std::size_t>(whole ? root[static_cast<std::size_t>(node)] : node)] = true;
-  };
-  mark(fixed, held, true);
-  mark(avoid, avoided, false);
+  std::vector<bool> avoided(root.size(), false), held(root.size(), false);
+  for (const auto& name : avoid)
+    for (const Index node : mesh.part(name).nodes.reshaped()) avoided[static_cast<std::size_t>(node)] = true;
   std::vector<std::vector<Index>> parts(root.size());
   for (std::size_t i = 0; i < root.size(); ++i)
-    if (!held[static_cast<std::size_t>(root[i])])
-      parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
+    parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
+  std::vector<std::vector<std::size_t>> forms(root.size());
+  for (std::size_t i = 0; i < resisted.nodes.size(); ++i) {
+    forms[static_cast<std::size_t>(root[static_cast<std::size_t>(resisted.nodes[i])])].push_back(i);
+    held[static_cast<std::size_t>(resisted.nodes[i])] = true;
+  }
   std::vector<Eigen::VectorXd> rows;  // Z at the springs
   for (const auto& nodes : parts) {
     if (nodes.size() < 2) continue;  // a node of no cell
-    const Eigen::MatrixXd z = motions_of<d>(mesh, nodes, block);
+    const std::vector<std::size_t>& here = forms[static_cast<std::size_t>(root[static_cast<std::size_t>(nodes[0])])];
+    const Eigen::MatrixXd z = unresisted(motions_of<d>(mesh, nodes, block), nodes, resisted, here);
     const Eigen::Index first = count(), several = z.cols();
+    if (several == 0) continue;
     for (Eigen::Index j = 0; j < several; ++j) {
       Eigen::VectorXd values = Eigen::VectorXd::Zero(mesh.nodes.rows() * block);
       for (std::size_t i = 0; i < nodes.size(); ++i)
@@ -104,7 +123,11 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const 
     for (const Index node : nodes) firmest = std::max(firmest, firmness[node]);
     for (std::size_t i = 0; firmest > 0 && i < nodes.size(); ++i)
       weighted.middleRows(static_cast<Eigen::Index>(i) * block, block) *= std::sqrt(firmness[nodes[i]] / firmest);
-    Eigen::MatrixXd candidates = weighted;
+    Eigen::MatrixXd candidates;
+    for (std::size_t i = 0; i < nodes.size(); ++i)  // a spring at a held node would act on what is held
+      if (held[static_cast<std::size_t>(nodes[i])])
+        weighted.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();
+    candidates = weighted;
     for (std::size_t i = 0; i < nodes.size(); ++i)
       if (avoided[static_cast<std::size_t>(nodes[i])])
         candidates.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();
@@ -234,9 +257,9 @@ Eigen::VectorXd RigidMotions::remove(Vec x) const {
 
 void RigidMotions::carry(const Eigen::VectorXd& motions, Vec x) const { combine(motions_, motions, x); }
 
-template RigidMotions::RigidMotions(const Layout<2>&, int, int, const std::vector<std::string>&,
-                                    const std::vector<std::string>&, const Eigen::VectorXd&);
-template RigidMotions::RigidMotions(const Layout<3>&, int, int, const std::vector<std::string>&,
-                                    const std::vector<std::string>&, const Eigen::VectorXd&);
+template RigidMotions::RigidMotions(const Layout<2>&, int, int, const Resisted&, const std::vector<std::string>&,
+                                    const Eigen::VectorXd&);
+template RigidMotions::RigidMotions(const Layout<3>&, int, int, const Resisted&, const std::vector<std::string>&,
+                                    const Eigen::VectorXd&);
 
 }  // namespace warmslip

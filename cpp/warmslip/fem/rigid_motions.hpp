@@ -31,13 +31,20 @@ class RigidMotions {
  public:
   using Apply = std::function<void(Vec, Vec)>;
 
+  /// Linear forms of the values of single nodes: `rows` (block) at the node of the same number.
+  struct Resisted {
+    std::vector<Index> nodes;
+    std::vector<Eigen::VectorXd> rows;
+  };
+
   RigidMotions() = default;
-  /// Rigid motions (block d) or constants (block 1) of the parts of the mesh that hang together and have no node in the
-  /// `fixed` parts; displacement by x - centre over the size of the part, dimensionless. The operator has `width`
-  /// unknowns a node, those of the motion first. `avoid`: nodes that get no spring where others will do; `firmness`
-  /// (nodes of the mesh): how much the inner forces resist a relative motion there, in any unit.
+  /// Rigid motions (block d) or constants (block 1) of the parts of the mesh that hang together, those of them that
+  /// nothing resists: the products of the rows of `resisted` with their values vanish. Displacement by x - centre over
+  /// the size of the part, dimensionless. The operator has `width` unknowns a node, those of the motion first. `avoid`:
+  /// nodes that get no spring where others will do; `firmness` (nodes of the mesh): how much the inner forces resist a
+  /// relative motion there, in any unit.
   template <int d>
-  RigidMotions(const Layout<d>& layout, int block, int width, const std::vector<std::string>& fixed,
+  RigidMotions(const Layout<d>& layout, int block, int width, const Resisted& resisted,
                const std::vector<std::string>& avoid, const Eigen::VectorXd& firmness);
 
   bool empty() const { return motions_.empty(); }

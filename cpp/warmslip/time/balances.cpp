@@ -30,6 +30,9 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   }
   if (operators.viscosity) viscous_w_ = layout.vector(d);
   if (surface.points() > 0) contact_force_ = layout.vector(d);
+  if (problem.moves()) reactions_ = layout.vector(d);
+  if (operators.springs) springs_ = layout.vector(d);
+  if (operators.dashpots) dashpots_ = layout.vector(d);
   if (operators.conductivity) conducted_ = layout.vector(1);
   if (operators.exchange) exchanged_ = layout.vector(1);
   if (operators.conductivity && problem.contact_heats()) {
@@ -40,10 +43,14 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
   for (PetscInt& i : unknowns_) i -= first * d;
   for (PetscInt& i : nodes_) i -= first;
-  displacement_prescribed_.resize(static_cast<std::size_t>(layout.owned()));
-  temperature_prescribed_.resize(displacement_prescribed_.size());
-  for (const PetscInt i : operators.prescribed_displacement)
-    displacement_prescribed_[static_cast<std::size_t>(i / d - first)] = true;
+  support_.assign(static_cast<std::size_t>(layout.owned()), -1);
+  temperature_prescribed_.resize(support_.size());
+  for (const auto& [node, held] : held_directions(problem)) {
+    const PetscInt at = layout.global_of(node) - first;
+    if (at < 0 || at >= layout.owned()) continue;
+    support_[static_cast<std::size_t>(at)] = static_cast<int>(held_.size());
+    held_.push_back(held);
+  }
   for (const PetscInt i : operators.prescribed_temperature)
     temperature_prescribed_[static_cast<std::size_t>(i - first)] = true;
   for (const auto& [rows, size] :
@@ -70,6 +77,8 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
 template <int d>
 Balances BalanceEvaluator<d>::evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& in) {
   if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
+  if (springs_) multiply(operators_.springs, after.shape(), springs_);
+  if (dashpots_) multiply(operators_.dashpots, after.straining(), dashpots_);
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
   return terms(before, after, in);

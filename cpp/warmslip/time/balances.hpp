@@ -26,6 +26,8 @@ class BalanceEvaluator {
                        Vec external = nullptr) const;
   void heat_defect(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs, Vec out,
                    Vec external = nullptr) const;
+  /// Forces of the supports on the body at the nodes in the step that was evaluated last, zero where nothing is held.
+  const VecHandle& reactions() const { return reactions_; }
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
   /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
   /// any, gets the same but for the inner terms, whose rounding moves no rigid body.
@@ -41,13 +43,15 @@ class BalanceEvaluator {
   double temperature_of_rounding(const TimeLevel& before, const TimeLevel& after, double k) const;
   void find_shape_functions();
   Eigen::VectorXd at_points(Vec v) const;
+  void release(Vec forces) const;
   void place(const std::vector<PetscInt>& at, const Eigen::VectorXd& nodal, Vec out) const;
 
   const Layout<d>& layout_;
   const Problem<d>& problem_;
   const Operators<d>& operators_;
   const ContactSurface<d>& surface_;
-  VecHandle viscous_w_, contact_force_;                 // B w, E lambda
+  VecHandle viscous_w_, contact_force_, reactions_;     // B w, E lambda
+  VecHandle springs_, dashpots_;                        // S u, S w of springs and dashpots
   VecHandle conducted_, exchanged_;                     // D theta, J theta
   VecHandle contact_heat_, contact_heat_size_;          // heat that leaves at the contact points, and its magnitudes
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // hat functions at the contact points, found from positions
@@ -61,8 +65,10 @@ class BalanceEvaluator {
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
-  std::vector<PetscInt> unknowns_, nodes_;                              // of contact, relative to the owned range
-  std::vector<bool> displacement_prescribed_, temperature_prescribed_;  // a node
+  std::vector<PetscInt> unknowns_, nodes_;    // of contact, relative to the owned range
+  std::vector<bool> temperature_prescribed_;  // a node
+  std::vector<int> support_;                  // of a node in held_, -1 where it is free
+  std::vector<Tensor2<d>> held_;              // projectors onto the directions in which the displacement is given
   double rigid_share_ = 1;
   bool stores_magnitudes_ = false;             // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity

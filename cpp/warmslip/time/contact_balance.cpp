@@ -69,7 +69,8 @@ void BalanceEvaluator<d>::place(const std::vector<PetscInt>& at, const Eigen::Ve
 // that forces and penetrations obey the law is a balance of its own.
 template <int d>
 void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
-  const Eigen::VectorXd w_points = at_points(after.w), u1_points = at_points(after.u), u0_points = at_points(before.u);
+  const Eigen::VectorXd w_points = at_points(after.w) - in.drive, u1_points = at_points(after.u),
+                        u0_points = at_points(before.u);
   const ContactProblem<d> problem = contact_problem(problem_, surface_, in.k, u0_points, after.gap, in.contact_free);
   double stored_before = 0;
   // an open point that cohesion holds has a normal force of rounding, which is none
@@ -99,6 +100,9 @@ void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& afte
     const double speed = (w - w.dot(nu) * nu).norm(), pressure = std::max(lambda, 0.0) / weight;
     const double bound = weight * law.friction.bound(pressure, speed).value;
     l.friction += in.k * friction_power(law.friction, bound, speed);
+    const Point<d> drive = in.drive.template segment<d>(i * d), force = in.contact_force.template segment<d>(i * d);
+    l.foundation_work -= in.k * force.dot(drive);
+    work_magnitude_ += in.k * force.cwiseAbs().dot(drive.cwiseAbs());
     // of the work of the force on all that its penetration is made of
     const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(nu.cwiseAbs()); };
     work_magnitude_ += std::abs(lambda) * (along(u1) + along(u0) + std::abs(after.gap[i]) + std::abs(before.gap[i]));

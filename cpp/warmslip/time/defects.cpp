@@ -27,9 +27,19 @@ void BalanceEvaluator<d>::momentum_defect(const TimeLevel& before, const TimeLev
   add(out, 1, in.expansion_theta);
   add(out, -1, viscous_w_);
   add(out, -1, after.elastic_u);
-  Values values(out);
-  for (PetscInt i = 0; i < layout_.owned(); ++i)
-    if (displacement_prescribed_[static_cast<std::size_t>(i)]) (*values).template segment<d>(i * d).setZero();
+  release(out);
+}
+
+// Takes the forces off that supports bear.
+template <int d>
+void BalanceEvaluator<d>::release(Vec forces) const {
+  Values values(forces);
+  for (PetscInt i = 0; i < layout_.owned(); ++i) {
+    const int support = support_[static_cast<std::size_t>(i)];
+    if (support < 0) continue;
+    auto here = (*values).template segment<d>(i * d);
+    here -= (held_[static_cast<std::size_t>(support)] * here).eval();
+  }
 }
 
 template <int d>
@@ -55,15 +65,18 @@ void BalanceEvaluator<d>::add_rounding(Vec defect, Vec external) const {
   const Eigen::Index block = block_size(defect);
   const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
                         &outer = block == 1 ? heat_external_ : force_external_;
-  Values values(defect), outer_values(external);
-  for (PetscInt i = 0; i < layout_.owned(); ++i)
-    for (Eigen::Index a = 0; a < block; ++a) {
-      const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
-      const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
-      (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
-      if (external)
-        (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];
-    }
+  {
+    Values values(defect), outer_values(external);
+    for (PetscInt i = 0; i < layout_.owned(); ++i)
+      for (Eigen::Index a = 0; a < block; ++a) {
+        const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
+        const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
+        (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
+        if (external)
+          (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];
+      }
+  }
+  if (block == d) release(defect);
 }
 
 template class BalanceEvaluator<2>;

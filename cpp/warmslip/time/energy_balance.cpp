@@ -20,11 +20,11 @@ void BalanceEvaluator<d>::energy(const TimeLevel& before, const TimeLevel& after
   const double contact_before = l.contact - l.contact_change;
   const double sum = l.kinetic_change + l.elastic_change + l.contact_change + l.inertia_damping + l.elastic_damping +
                      l.contact_damping + l.viscous + l.friction - l.load_work - l.expansion_work - l.gap_work -
-                     l.support_work;
-  l.energy_residual =
-      relative(sum, largest_of({l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before,
-                                l.viscous, l.friction, l.load_work, l.expansion_work, l.gap_work, l.support_work}) +
-                        work_magnitude_);
+                     l.support_work - l.foundation_work;
+  l.energy_residual = relative(
+      sum, largest_of({l.kinetic, kinetic_before, l.elastic, elastic_before, l.contact, contact_before, l.viscous,
+                       l.friction, l.load_work, l.expansion_work, l.gap_work, l.support_work, l.foundation_work}) +
+               work_magnitude_);
 }
 
 template class BalanceEvaluator<2>;

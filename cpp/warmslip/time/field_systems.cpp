@@ -69,7 +69,25 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
     less(operators_.elasticity, k, loads.support_velocity);
   }
   if (monolithic() && loads.support_temperature) less(operators_.expansion, -1, loads.support_temperature);
-  fix(out, operators_.prescribed_displacement, loads.support_velocity);
+  hold(out, loads.support_velocity);
+}
+
+// The held directions of a right-hand side of the motion: the given velocity, or zero.
+template <int d>
+void Stepper<d>::hold(Vec v, Vec given) const {
+  fix(v, operators_.prescribed_displacement, given);
+  const PetscInt first = layout_.owned() ? layout_.global_nodes()[0] : 0;
+  Values values(v), known(given);
+  for (std::size_t i = 0; i < operators_.inclined.size(); ++i) {
+    const HeldNode<d>& one = operators_.inclined[i];
+    const PetscInt at = layout_.global_of(one.node) - first;
+    if (at < 0 || at >= layout_.owned()) continue;
+    auto here = (*values).template segment<d>(at * d);
+    here -= (one.held * here).eval();
+    if (given)
+      here += systems_->support_scales[static_cast<Eigen::Index>(i)] *
+              (one.held * (*known).template segment<d>(at * d)).eval();
+  }
 }
 
 // q + M theta_{n-1} / k + E w, less what warm supports conduct; `scale` is that of the heat rows
@@ -98,6 +116,12 @@ Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   return systems_->contact ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
+// Velocities of the contact points relative to the foundation, (d points).
+template <int d>
+Eigen::VectorXd Stepper<d>::sliding(Vec w) const {
+  return surface_.at_points(surface_.nodal_values(w)) - drive_;
+}
+
 // Gives the contact nodes that are also points the velocity of their law, in w; `moved` has the same change. Rounding
 // of the free velocity would else be that of a penetration far smaller.
 template <int d>
@@ -111,13 +135,14 @@ void Stepper<d>::apply_contact_velocity(const ContactSolution<d>& contact, Vec w
   for (const Eigen::Index i : closed) {
     const Eigen::Index node = surface_.own_node(i);
     const auto point = static_cast<std::size_t>(i);
-    const Point<d> velocity = nodal.segment<d>(node * d);
+    const Point<d> velocity = nodal.segment<d>(node * d) - drive_.segment<d>(i * d);
     change.segment<d>(node * d) =
         settled<d>(posed_.law(point), posed_.points[point], systems_->k, contact.status[point],
                    contact.force.template segment<d>(i * d), posed_.free.template segment<d>(i * d), velocity) -
         velocity;
   }
   if (change.isZero(0)) return;
+  change = surface_.released(change);
   surface_.add(change, w);
   if (moved) surface_.add(change, moved);
 }
@@ -194,6 +219,7 @@ bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& fro
     }
     free_ = reduce(monolithic() ? coupled_right_ : momentum_right_, momentum_external_);
     if (systems_->contact && !systems_->rigid.empty()) free_ += systems_->carried * from;
+    if (systems_->contact) free_ -= drive_;
   }
   if (!systems_->contact) return true;
   if (!in_range(free_)) return false;
@@ -227,7 +253,7 @@ void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
   if (reactive()) {
     beside_ = surface_.nodal_mean(loads.foundation);
-    flow_ = flow(loads, next_.contact_force, surface_.at_points(surface_.nodal_values(next_.w)));
+    flow_ = flow(loads, next_.contact_force, sliding(next_.w));
   }
   solve_heat(heat_right_, heat_external_, flow_.given, beside_, next_.theta);
 }

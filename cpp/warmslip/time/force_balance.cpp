@@ -43,7 +43,7 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
-        s0(before.shape());
+        s0(before.shape()), reactions(reactions_), springs(springs_), dashpots(dashpots_);
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const Point<d> position =
           layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
@@ -52,6 +52,7 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       };
       const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
                      elastic = at(*e1), viscous = at(*b), expansion = at(*g), way = at(*velocity);
+      const Point<d> springy = at(*springs) + at(*dashpots);
       const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
       const auto row = [i](const Eigen::VectorXd& rows) { return rows.size() ? rows[i] : 0; };
       const auto size = [](const Point<d>& p) { return p.cwiseAbs().maxCoeff(); };
@@ -60,7 +61,9 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
                    moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
                    within = u * row(elastic_rows_) + w * row(viscous_rows_),
                    magnitude = moved + given + within + theta * row(expansion_rows_);
-      const bool fixed = displacement_prescribed_[static_cast<std::size_t>(i)];
+      const int support = support_[static_cast<std::size_t>(i)];
+      const Tensor2<d>* held = support >= 0 ? &held_[static_cast<std::size_t>(support)] : nullptr;
+      const bool fixed = held && held->isIdentity(0);
       // a force in one direction has no rounding in another, in which the body may be free to move
       const Point<d> outer =
           fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
@@ -68,13 +71,19 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       if (stores_magnitudes_)
         force_magnitudes_.template segment<d>(i * d) =
             fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
-      if (fixed) {
-        force.add(position, external - left, magnitude);
-        l.support_work += in.k * left.dot(way);
+      if (held) {
+        const Point<d> reaction = *held * left;
+        force.add(position, external + springy - reaction, magnitude);
+        l.support_work += in.k * reaction.dot(way);
+        (*reactions).template segment<d>(i * d) = reaction;
       } else {
         // inner forces cancel in the sum over a body
-        force.add(position, external, moved + given + rigid_share_ * (magnitude - moved - given));
-        const double rest = left.allFinite() ? size(left) : std::numeric_limits<double>::infinity();
+        force.add(position, external + springy,
+                  moved + given + size(springy) + rigid_share_ * (magnitude - moved - given));
+      }
+      if (!fixed) {
+        const Point<d> over = held ? Point<d>(left - *held * left) : left;
+        const double rest = over.allFinite() ? size(over) : std::numeric_limits<double>::infinity();
         raise(defect, rest);
         // a point at rest has a strain rate of rounding of the rigid motion, which it stops
         const double least = after.strained && surface_.points() > 0

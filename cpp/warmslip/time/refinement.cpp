@@ -51,7 +51,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   ContactSolution<d> change, again;
   correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
   if (systems_->contact) {
-    const Eigen::VectorXd velocity = surface_.at_points(surface_.nodal_values(next_.w));
+    const Eigen::VectorXd velocity = sliding(next_.w);
     posed_.known_force = contact.force;
     posed_.known_velocity = apply ? velocity + correction : velocity;
     posed_.rigid = rigid_load_;
@@ -145,7 +145,7 @@ void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
   if (reactive()) {
     const Eigen::VectorXd velocity = surface_.nodal_values(next_.w) + surface_.nodal_values(correction_w_),
                           warmer = surface_.nodal_values(next_.theta) - beside_;
-    const NodalFlow there = flow(loads, next_.contact_force + correction_force_, surface_.at_points(velocity));
+    const NodalFlow there = flow(loads, next_.contact_force + correction_force_, surface_.at_points(velocity) - drive_);
     given = there.given - flow_.given - (there.lost - flow_.lost) * warmer;
   }
   solve_heat(heat_right_, heat_external_, given, none, correction_theta_);
@@ -168,7 +168,7 @@ Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   for (Eigen::Index i = 0; i < surface_.points(); ++i)
     apart = apart || (surface_.own_node(i) < 0 && !surface_.prescribed(i));
   if (!apart) return Eigen::VectorXd::Zero(surface_.points() * d);
-  Eigen::VectorXd out = surface_.at_points(surface_.nodal_values(next_.w));
+  Eigen::VectorXd out = sliding(next_.w);
   const double tolerated = options_.contact.tolerance * std::max(largest_entry(out), largest_entry(free_));
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const Point<d> nu = surface_.normals().row(i).transpose();

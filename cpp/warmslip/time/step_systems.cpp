@@ -36,6 +36,25 @@ std::vector<std::string> parts_in_contact(const Problem<d>& problem, bool mechan
   return names;
 }
 
+// The nodes of parts, each value of which is prescribed.
+template <int d>
+RigidMotions::Resisted nodes_of(const Problem<d>& problem, const std::vector<std::string>& parts) {
+  RigidMotions::Resisted out;
+  for (const std::string& name : parts)
+    for (const Index node : problem.mesh->part(name).nodes.reshaped()) {
+      out.nodes.push_back(node);
+      out.rows.push_back(Eigen::VectorXd::Ones(1));
+    }
+  return out;
+}
+
+// What supports and springs resist.
+template <int d>
+RigidMotions::Resisted resisted(const Problem<d>& problem) {
+  const ResistedDirections<d> directions = resisted_directions(problem);
+  return {directions.nodes, {directions.rows.begin(), directions.rows.end()}};
+}
+
 }  // namespace
 
 template <int d>
@@ -63,7 +82,7 @@ StepSystems<d>::StepSystems(const Layout<d>& layout, const Problem<d>& problem, 
       const double storing = largest_diagonal(operators.mass) / k + largest_diagonal(operators.exchange);
       if (storing < 0.1 * largest_diagonal(operators.conductivity))
         constants = RigidMotions(
-            layout, 1, 1, problem.prescribed_temperature, parts_in_contact(problem, false),
+            layout, 1, 1, nodes_of(problem, problem.prescribed_temperature), parts_in_contact(problem, false),
             at_nodes(problem, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
       if (!constants.empty()) constants.add_springs(h);
       const auto apart = problem.contact_heats() ? surface.global_nodes() : std::vector<PetscInt>{};
@@ -99,11 +118,16 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
                                    const std::string& name, Backend backend) {
   if (operators.elasticity || operators.viscosity)
     rigid =
-        RigidMotions(layout, d, width, problem.prescribed_displacement, parts_in_contact(problem, true),
+        RigidMotions(layout, d, width, resisted(problem), parts_in_contact(problem, true),
                      at_nodes(problem, [&](const Material<d>& m) {
                        return (m.elasticity ? k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
                      }));
+  if (!rigid.empty() && !problem.inertial() && surface.points() == 0)
+    throw std::invalid_argument(
+        "nothing holds the body: its supports leave it, or a part of it, a rigid motion, and it has no inertia and no "
+        "contact; hold one more place or component, or give inertia.density > 0");
   if (!rigid.empty()) rigid.add_springs(a);
+  support_scales = warmslip::support_scales(layout, operators, a, width);
   momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
   if (rigid.empty()) return;
   rigid.prepare(*momentum, [&](Vec x, Vec y) {

@@ -22,6 +22,7 @@ struct StepSystems {
 
   double k;                                ///< step size, time
   double coupled_scale = 1;                ///< of the heat rows in the coupled operator
+  Eigen::VectorXd support_scales;          ///< of the inclined nodes in the operator of the motion
   std::unique_ptr<Factor> momentum, heat;  ///< null where absent; monolithic: `momentum` holds both fields
   RigidMotions rigid, constants;           ///< of motion and of heat, where nothing is prescribed
   std::unique_ptr<ContactSolver<d>> contact;

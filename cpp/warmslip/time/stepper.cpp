@@ -122,7 +122,7 @@ void Stepper<d>::take_vectors() {
     held = layout_.sum(std::move(held));
     for (const PetscInt i : surface_.global_nodes()) fixed_contact_.push_back(held[i] > 0);
   }
-  contact_force_ = Eigen::VectorXd::Zero(surface_.points() * d);
+  contact_force_ = drive_ = Eigen::VectorXd::Zero(surface_.points() * d);
   status_.assign(static_cast<std::size_t>(surface_.points()), Status::open);
 }
 
@@ -199,7 +199,8 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           (options_.coupling == Coupling::lagged ? now_ : next_).sizes.straining,
           contact.force,
           free_,
-          loads.foundation};
+          loads.foundation,
+          drive_};
 }
 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.
@@ -298,8 +299,11 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     throw std::invalid_argument("a load vector is missing");
   if (reactive() && loads.foundation.size() != surface_.points())
     throw std::invalid_argument("the foundation's temperature needs one value a contact point");
+  if (loads.foundation_velocity.size() != 0 && loads.foundation_velocity.size() != surface_.points() * d)
+    throw std::invalid_argument("the foundation's velocity needs d values a contact point");
   const Timed timed(cost_.step_seconds);
   const int before = substitutions();
+  drive_ = surface_.tangential(loads.foundation_velocity);
   errors_ = {};
   undetermined_ = false;
   grazing_ = 1;

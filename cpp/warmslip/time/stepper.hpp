@@ -67,7 +67,9 @@ struct StepLoads {
   /// temperature; null: zero.
   Vec support_velocity = nullptr, support_temperature = nullptr;
   Eigen::VectorXd foundation{};  ///< theta_F (points), where the conductance depends on the pressure
-  bool measured = false;         ///< digits are estimated in this step whatever its number
+  /// Velocity of the foundation at the contact points, (d points), of which the law sees the tangential part; empty: 0.
+  Eigen::VectorXd foundation_velocity{};
+  bool measured = false;                                   ///< digits are estimated in this step whatever its number
   double time = std::numeric_limits<double>::quiet_NaN();  ///< at the end of the step; nan: k after the last one
 };
 
@@ -140,6 +142,8 @@ class Stepper {
   const Eigen::VectorXd& contact_force() const { return contact_force_; }  ///< (d points), force on the foundation
   const std::vector<Status>& status() const { return status_; }
   const FieldExtents& extents() const { return extents_; }
+  /// Forces of the supports on the body in the last step, nodal; null without motion.
+  const VecHandle& reactions() const { return evaluator_.reactions(); }
   const ContactSolver<d>* contact_solver() const {
     return systems_->contact.get();
   }                                                          ///< nullptr without contact points
@@ -193,10 +197,12 @@ class Stepper {
   Motion motion_of(const ContactSolution<d>& contact) const;
   void undo(const Motion& motion, ContactSolution<d>& contact);
   Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
+  Eigen::VectorXd sliding(Vec w) const;
   void note_temperature(const Balances& balances);
   void add_heat_of_error(const StepLoads& loads);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
+  void hold(Vec v, Vec given) const;
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
   bool monolithic() const { return options_.coupling == Coupling::monolithic && systems_->momentum && now_.theta; }
   bool reactive() const { return systems_->heat && surface_.points() > 0 && problem_.contact_heats(); }
@@ -219,8 +225,9 @@ class Stepper {
   Eigen::VectorXd correction_force_;             // of the contact points
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for motions solved for apart
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
-  Eigen::VectorXd free_;                         // velocity of the contact points without contact force
-  Eigen::VectorXd rigid_load_;                   // load on the rigid motions
+  Eigen::VectorXd drive_;                        // tangential velocity of the foundation at the contact points
+  Eigen::VectorXd free_;        // velocity of the contact points without contact force, relative to the foundation
+  Eigen::VectorXd rigid_load_;  // load on the rigid motions
   NodalFlow flow_;
   Eigen::VectorXd beside_;   // temperature of the foundation at the contact nodes
   ContactProblem<d> posed_;  // the contact problem that was solved last

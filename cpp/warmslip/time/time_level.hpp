@@ -32,6 +32,7 @@ struct Balances {
   double inertia_damping, elastic_damping, contact_damping;  ///< backward Euler's own dissipation
   double viscous, friction;
   double load_work, expansion_work, gap_work, support_work;  ///< the last: of the reactions of moving supports
+  double foundation_work;                                    ///< of the friction of a foundation that moves along
   /// the same balance for theta; `support_heat`: of parts with a prescribed temperature
   double heat_change, heat_damping, conducted, exchanged, supplied, heating, friction_heating, support_heat;
   /// Backward errors: what a balance leaves over, against the sum of the magnitudes of what was added in it, with
@@ -54,8 +55,9 @@ struct StepInputs {
   Vec expansion_theta, heating_w;     ///< the ones the coupling used
   double coupling_theta, coupling_w;  ///< largest temperature of the former and straining velocity of the latter
   Eigen::VectorXd contact_force;      ///< at the points, (d points)
-  Eigen::VectorXd contact_free;       ///< velocity the points would have without contact, for the size of its terms
+  Eigen::VectorXd contact_free;       ///< velocity without contact, as below, for the size of its terms
   Eigen::VectorXd foundation;         ///< theta_F at the points, where the conductance depends on the pressure
+  Eigen::VectorXd drive;              ///< tangential velocity of the foundation, to which slip is relative, (d points)
 };
 
 }  // namespace warmslip

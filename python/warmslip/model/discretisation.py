@@ -21,6 +21,7 @@ from warmslip.model.loads import Loads, data, evaluate
 from warmslip.model.materials import contact_part, materials, of_dim
 from warmslip.model.meshes import make_mesh
 from warmslip.model.prescribed import PrescribedContact
+from warmslip.model.supports import Supports, part_springs, supports
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
 from warmslip.scene.structure import structure
@@ -129,12 +130,12 @@ class Discretisation:
         Fields that the problem does not have are left aside.
         """
         u, w, theta = u.copy(), w.copy(), theta.copy()
-        for part, (nodes, values) in self.load_vectors.held("displacement", time).items():
-            u[nodes] = values
-            if part not in self.loads.displacement:  # a support that moves has the velocity that is given
-                w[nodes] = 0
-        for nodes, values in self.load_vectors.held("temperature", time).values():
-            theta[nodes] = values[:, 0]
+        supports = self.load_vectors.supports
+        u[supports.nodes] = supports.released(u[supports.nodes]) + self.load_vectors.displacement(time)
+        still = supports.still  # a support that moves has the velocity that is given
+        w[still.nodes] = still.released(w[still.nodes])
+        for nodes, values in self.load_vectors.temperature(time):
+            theta[nodes] = values
         return self.state(stepper, u, w, theta, time)
 
     def state(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
@@ -276,7 +277,7 @@ def discretise(
     posed = _posed(scene, mesh, loads, laws)
     layout = of_dim("Layout", scene.mesh.dim)(comm, mesh)
     surface = of_dim("ContactSurface", scene.mesh.dim)(layout, posed.problem)
-    held = {node for part in scene.supports.displacement for node in np.unique(mesh.parts[part])}
+    held = set(np.flatnonzero(posed.supports.held))
     for contact in scene.contacts:
         if contact.stiffness is not None and held.issuperset(np.unique(mesh.parts[contact.part])):
             raise ValueError(
@@ -296,6 +297,7 @@ class _Posed:
     problem: Any
     laws: list[CheckedLaw]
     user_functions: list[str]
+    supports: Supports
 
 
 def _posed(scene: Scene, mesh: Any, loads: Loads | None, laws: dict[str, Law] | None) -> _Posed:
@@ -304,16 +306,20 @@ def _posed(scene: Scene, mesh: Any, loads: Loads | None, laws: dict[str, Law] | 
         name for part in sorted(laws or {}) for name in (laws or {})[part].names(part)
     ]
     given, regions = materials(scene, mesh)
+    loads = loads or Loads.of(scene)
+    held = Supports(supports(scene, loads, mesh), np.asarray(mesh.nodes))
     problem = of_dim("Problem", scene.mesh.dim)(
         mesh=mesh,
         materials=given,
         regions=regions,
-        prescribed_displacement=list(scene.supports.displacement),
+        prescribed_displacement=scene.supports.clamped,
         prescribed_temperature=list(scene.supports.temperature),
         contacts=[contact_part(contact, watched.get(contact.part)) for contact in scene.contacts],
         lumped=scene.heat is not None and scene.heat.capacity_matrix == "lumped",
+        held_nodes=held.partly_clamped(scene.supports.clamped, mesh.parts),
+        springs=part_springs(scene),
     )
-    return _Posed(scene, loads or Loads.of(scene), problem, list(watched.values()), user_functions)
+    return _Posed(scene, loads, problem, list(watched.values()), user_functions, held)
 
 
 def _finished(
@@ -330,7 +336,7 @@ def _finished(
 ) -> Discretisation:
     """The discretisation of a scene whose operators are assembled. Raises ValueError for data that cannot be."""
     scene, loads = posed.scene, posed.loads
-    vectors = LoadVectors(scene, loads, mesh, layout, surface, comm, operators.reference, rules)
+    vectors = LoadVectors(scene, loads, posed.supports, mesh, layout, surface, comm, operators.reference, rules)
     rigid = frozenset(
         name.removeprefix("laws.").removesuffix(".compliance")
         for name in posed.user_functions

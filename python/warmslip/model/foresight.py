@@ -9,6 +9,7 @@ import numpy as np
 
 from warmslip.model.coupling import Coupled, coupled
 from warmslip.model.discretisation import Discretisation
+from warmslip.model.foundation import ShapeGap
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
 from warmslip.model.materials import cell_regions
@@ -53,8 +54,8 @@ def _gaps(d: Discretisation) -> list[str]:
     out = []
     of_part = np.asarray(d.surface.contacts, dtype=int)
     for i in np.unique(of_part):
-        gap = d.loads.on_contact("gap", int(i))
-        if not isinstance(gap, Formula):
+        gap = d.load_vectors.on_contact("gap", int(i))
+        if not isinstance(gap, Formula | ShapeGap):
             continue
         places = np.asarray(d.surface.positions)[of_part == i]
         times = np.linspace(0, d.scene.time.end, TIMES + 1) if of_time(gap) else np.zeros(1)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from warmslip._core import LoadQuadrature2, LoadQuadrature3
+from warmslip.model.foundation import ShapeGap
 from warmslip.model.loads import HEATED, ON_CONTACT, SUPPORTS, Data, Formula, Loads, evaluate, of_time, shaped
+from warmslip.model.supports import Supports
+from warmslip.scene.foundation_tables import ShapeTable
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
 
@@ -20,7 +23,7 @@ def _refuse_unused(scene: Scene, loads: Loads) -> None:
     for names, there, table in (
         (("source", "heat_flux", "contact_flux", "foundation_temperature"), scene.heat is not None, "[heat]"),
         (("body", "traction", "contact_traction"), scene.moves, "[elasticity], [viscosity] or [inertia]"),
-        (("gap",), touches, "[contact] with a stiffness"),
+        (("gap", "foundation_velocity"), touches, "[contact] with a stiffness"),
     ):
         for name in names:
             if not there and _acts(getattr(loads, name)):
@@ -46,7 +49,8 @@ def _refuse_unused(scene: Scene, loads: Loads) -> None:
 @dataclass(frozen=True)
 class StepData:
     """What one step is given: load vectors (f, v) and (q, eta), the gap (points), velocity and temperature of the supports
-    where those are not zero, theta_F (points) where the conductance depends on the pressure; None or empty what is absent."""
+    where those are not zero, theta_F (points) where the conductance depends on the pressure, the velocity of the foundation
+    (d points) where it moves along; None or empty what is absent."""
 
     force: Any
     heat: Any
@@ -54,9 +58,10 @@ class StepData:
     support_velocity: Any
     support_temperature: Any
     foundation: Array
+    foundation_velocity: Array
 
     def __iter__(self) -> Iterator[Any]:
-        return iter((self.force, self.heat, self.gap, self.support_velocity, self.support_temperature, self.foundation))
+        return iter(getattr(self, one.name) for one in fields(self))
 
 
 class LoadVectors:
@@ -70,6 +75,7 @@ class LoadVectors:
         self,
         scene: Scene,
         loads: Loads,
+        supports: Supports,
         mesh: Any,
         layout: Any,
         surface: Any,
@@ -81,9 +87,8 @@ class LoadVectors:
         _refuse_unused(scene, loads)
         self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
         self._nodes, self._layout, self._step = np.asarray(mesh.nodes), layout, scene.step
-        self._held = {
-            name: {part: np.unique(mesh.parts[part]) for part in getattr(scene.supports, name)} for name in SUPPORTS
-        }
+        self._supports = supports
+        self._cooled = {part: np.unique(mesh.parts[part]) for part in scene.supports.temperature}
         moves, conducts = scene.moves, scene.heat is not None
         quadrature = LoadQuadrature2 if dim == 2 else LoadQuadrature3
         self.rules = rules = {} if rules is None else rules
@@ -126,22 +131,26 @@ class LoadVectors:
         moving = [any(mechanical == motion for mechanical, *_ in self._moving) for motion in (True, False)]
         self._present = layout.vector(dim) if moving[0] else None, layout.vector(1) if moving[1] else None
         # a support that stays where it is has no velocity; one at zero has no temperature
-        self._velocity = layout.vector(dim) if moves and any(map(of_time, loads.displacement.values())) else None
+        self._velocity = layout.vector(dim) if moves and supports.of_time else None
         warm = conducts and any(callable(v) or np.any(v) for v in loads.temperature.values())
         self._temperature = layout.vector(1) if warm else None
         self._warmed = False
         touching = [i for i, c in enumerate(scene.contacts) if c.stiffness is not None]
         self._points = {i: np.flatnonzero(np.asarray(surface.contacts, int) == i) for i in touching}
         self._reactive = conducts and any(c.heats for c in scene.contacts)
+        driven = [loads.on_contact("foundation_velocity", i) for i in touching]
+        self._drives = any(callable(one) or np.any(one) for one in driven)
         self._kept: dict[str, Array] = {}
         self._try(scene.clock.step(1)[0])
+        for t in (0.0, 0.5 * scene.time.end, scene.time.end) if supports.meet else ():
+            self.displacement(t)
 
     @property
     def of_time(self) -> bool:
         """Whether any datum changes in time."""
-        given = [*self._loads.displacement.values(), *self._loads.temperature.values()]
+        given = [*self._loads.temperature.values()]
         given += [self._loads.on_contact(name, i) for i in self._points for name in ON_CONTACT]
-        return bool(self._moving) or any(map(of_time, given))
+        return bool(self._moving) or self._supports.of_time or any(map(of_time, given))
 
     def _try(self, t: float) -> None:
         """Calls the functions in Python of the first step: one that is wrong is refused here, and not the outcome of a run."""
@@ -177,36 +186,54 @@ class LoadVectors:
 
     def on_points(self, name: str, t: float) -> Array:
         """`gap` or `foundation_temperature` at the contact points at time t, (points,)."""
+        return self._on_points(name, t, 1)[:, 0]
+
+    def _on_points(self, name: str, t: float, components: int) -> Array:
         if name in self._kept:
             return self._kept[name]
         x = np.asarray(self._surface.positions)
-        out, moving = np.zeros(len(x)), False
+        out, moving = np.zeros((len(x), components)), False
         for i, points in self._points.items():
-            value = self._loads.on_contact(name, i)
-            out[points] = self._together(value, x[points], t, 1, ON_CONTACT[name])[:, 0]
+            value = self.on_contact(name, i)
+            out[points] = self._together(value, x[points], t, components, ON_CONTACT[name])
             moving = moving or of_time(value)
         if not moving:
             self._kept[name] = out
         return out
 
-    def held(self, name: str, t: float) -> dict[str, tuple[Any, Array]]:
-        """What is given at time t, by part: held nodes (n,), their `displacement` (n, d) or `temperature` (n, 1)."""
-        given, components = getattr(self._loads, name), SUPPORTS[name] or self._dim
-        return {
-            part: (
+    def on_contact(self, name: str, number: int) -> Data:
+        """The datum of a contact part at its points; the gap to a shape is that along their normals."""
+        value = self._loads.on_contact(name, number)
+        if isinstance(value, ShapeTable):
+            return ShapeGap(value, np.asarray(self._surface.normals)[self._points[number]])
+        return value
+
+    @property
+    def supports(self) -> Supports:
+        """What holds the body."""
+        return self._supports
+
+    def displacement(self, t: float) -> Array:
+        """The given displacement of the nodes of `supports` at time t, (n, d), length; zero in free directions."""
+        return self._supports.displacement(t, self._together)
+
+    def temperature(self, t: float) -> list[tuple[Any, Array]]:
+        """The given temperature at time t, part by part: nodes (n,) and values (n,)."""
+        return [
+            (
                 nodes,
-                self._together(given.get(part, 0.0), self._nodes[nodes], t, components, f"supports.{name}.{part}"),
+                self._together(
+                    self._loads.temperature.get(part, 0.0), self._nodes[nodes], t, 1, f"supports.temperature.{part}"
+                )[:, 0],
             )
-            for part, nodes in self._held[name].items()
-        }
+            for part, nodes in self._cooled.items()
+        ]
 
     def _support_velocity(self, t: float, step: float) -> Any:
         if self._velocity is None:
             return None
         values = np.zeros((len(self._nodes), self._dim))
-        before = self.held("displacement", t - step)
-        for part, (nodes, now) in self.held("displacement", t).items():
-            values[nodes] = (now - before[part][1]) / step
+        values[self._supports.nodes] = (self.displacement(t) - self.displacement(t - step)) / step
         self._layout.distribute(values.ravel(), self._velocity)
         return self._velocity
 
@@ -214,8 +241,8 @@ class LoadVectors:
         if self._temperature is None or self._warmed:
             return self._temperature
         values = np.zeros(len(self._nodes))
-        for nodes, now in self.held("temperature", t).values():
-            values[nodes] = now[:, 0]
+        for nodes, now in self.temperature(t):
+            values[nodes] = now
         self._layout.distribute(values, self._temperature)
         self._warmed = not any(map(of_time, self._loads.temperature.values()))
         return self._temperature
@@ -235,14 +262,15 @@ class LoadVectors:
             self._add((pair[0], pair[1]), mechanical, rule, data, t, what)
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
         velocity, temperature = self._support_velocity(t, step), self._support_temperature(t)
-        return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation)
+        drive = self._on_points("foundation_velocity", t, self._dim).ravel() if self._drives else np.empty(0)
+        return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation, drive)
 
 
 def _acts(data: Any) -> bool:
     """Whether a datum, or one of several, is a function or not zero."""
     if isinstance(data, dict | list | tuple):
         return any(_acts(one) for one in (data.values() if isinstance(data, dict) else data))
-    return callable(data) or bool(np.any(np.asarray(data, dtype=float) != 0))
+    return callable(data) or isinstance(data, ShapeTable) or bool(np.any(np.asarray(data, dtype=float) != 0))
 
 
 def _times(factor: float, data: Data) -> Data:

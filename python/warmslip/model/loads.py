@@ -9,13 +9,14 @@ import numpy as np
 
 from warmslip.messages import quoted
 from warmslip.scene.expressions import Expression, constant
+from warmslip.scene.foundation_tables import ShapeTable
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
 
 # what supports hold, and its components (None: as many as axes)
 SUPPORTS: dict[str, int | None] = {"displacement": None, "temperature": 1}
 HEATED = "contact.heat_exchange.foundation_temperature"
-ON_CONTACT = {"gap": "contact.gap", "foundation_temperature": HEATED}
+ON_CONTACT = {"gap": "contact.gap", "foundation_temperature": HEATED, "foundation_velocity": "contact.velocity"}
 # constants, or functions of positions (points, d) and time returning (points,) or (points, d)
 Data = Any
 
@@ -40,6 +41,11 @@ def data(value: Any) -> Data:
     if constant(*values):
         return np.array(values, dtype=float) if isinstance(value, list) else float(value)
     return Formula(tuple(Expression(str(v)) for v in values))
+
+
+def given_displacement(held: Any) -> Data:
+    """The datum of a support: of all components, 0 for those that are free, or along the normal."""
+    return data([0.0 if one == "free" else one for one in held] if isinstance(held, list) else held.normal)
 
 
 def of_time(data: Data) -> bool:
@@ -87,6 +93,7 @@ class Loads:
     contact_flux: Data = 0.0
     gap: Data | list[Data] = 0.0
     foundation_temperature: Data | list[Data] = 0.0
+    foundation_velocity: Data | list[Data] = 0.0
     points: int = 3
 
     def __post_init__(self) -> None:
@@ -114,16 +121,17 @@ class Loads:
             source=data(scene.heat.source) if scene.heat is not None else 0.0,
             traction={part: data(value) for part, value in scene.loads.traction.items()},
             heat_flux={part: data(value) for part, value in scene.loads.heat_flux.items()},
-            displacement={part: data(value) for part, value in scene.supports.moved.items()},
+            displacement={part: given_displacement(value) for part, value in scene.supports.moved.items()},
             temperature={part: data(value) for part, value in scene.supports.warmed.items()},
-            gap=each([data(c.gap) for c in contacts]),
+            gap=each([c.gap if isinstance(c.gap, ShapeTable) else data(c.gap) for c in contacts]),
             foundation_temperature=each(
                 [data(c.heat_exchange.foundation_temperature) if c.heat_exchange else 0.0 for c in contacts]
             ),
+            foundation_velocity=each([data(c.velocity) if c.velocity is not None else 0.0 for c in contacts]),
         )
 
     def on_contact(self, name: str, number: int) -> Data:
-        """`gap` or `foundation_temperature` of one contact part."""
+        """`gap`, `foundation_temperature` or `foundation_velocity` of one contact part."""
         value = getattr(self, name)
         return value[number] if isinstance(value, list) else value
 

@@ -31,9 +31,8 @@ class PrescribedContact:
     @cached_property
     def _points(self) -> list[tuple[int, Any, Array]]:
         """Number, nodes and their weights of every contact point on a rigid foundation whose nodes are all held."""
-        held = np.zeros(len(self.mesh.nodes), dtype=bool)
-        for part in self.scene.supports.displacement:
-            held[np.unique(self.mesh.parts[part])] = True
+        held, touched = self.vectors.supports.held, np.zeros(len(self.mesh.nodes), dtype=bool)
+        touched[self.vectors.supports.nodes] = True
         of_part = np.asarray(self.surface.contacts, dtype=int)
         out: list[tuple[int, Any, Array]] = []
         for i, contact in enumerate(self.scene.contacts):
@@ -41,20 +40,27 @@ class PrescribedContact:
             if contact.stiffness is None or not np.isinf(contact.compliance) or contact.part in self.user_compliances:
                 continue
             points = np.flatnonzero(of_part == i)
-            if not len(points) or not held[facets].any():
+            if not len(points) or not touched[facets].any():
                 continue
             places = np.asarray(self.surface.positions)[points]
             if contact.quadrature == "nodal":
-                out += _at_nodes(points, places, np.asarray(self.mesh.nodes), np.unique(facets[held[facets]]))
+                found = _at_nodes(points, places, np.asarray(self.mesh.nodes), np.unique(facets[touched[facets]]))
+                out += [point for point in found if self._across(point)]
             else:
                 out += _on_facets(points, places, np.asarray(self.mesh.nodes), facets[held[facets].all(axis=1)])
         return out
+
+    def _across(self, point: tuple[int, Any, Array]) -> bool:
+        """Whether the node of a point is held along the point's normal."""
+        supports, normal = self.vectors.supports, np.asarray(self.surface.normals)[point[0]]
+        projector = supports.projectors[np.searchsorted(supports.nodes, point[1][0])]
+        return bool(np.abs(projector @ normal - normal).max() < ROUNDING)
 
     @property
     def of_time(self) -> bool:
         """Whether supports or gaps of such points change in time."""
         gaps = [self.loads.on_contact("gap", i) for i, c in enumerate(self.scene.contacts) if c.stiffness is not None]
-        return bool(self._points) and any(map(of_time, [*self.loads.displacement.values(), *gaps]))
+        return bool(self._points) and (self.vectors.supports.of_time or any(map(of_time, gaps)))
 
     def inside(self, t: float) -> str:
         """Which of them is deepest inside at time t, with its cure; "" where none is (collective)."""
@@ -62,8 +68,7 @@ class PrescribedContact:
             return ""
         nodes, normals = np.asarray(self.mesh.nodes), np.asarray(self.surface.normals)
         moved = np.zeros_like(nodes)
-        for at, values in self.vectors.held("displacement", t).values():
-            moved[at] = values
+        moved[self.vectors.supports.nodes] = self.vectors.displacement(t)
         gap = self.vectors.on_points("gap", t)
         deepest, place, part = 0.0, np.zeros(0), ""
         for point, at, weights in self._points:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from warmslip.scene.expressions import Value
+from warmslip.scene.foundation_tables import ShapeTable
 from warmslip.scene.types import NonNegative, Positive, Table, _word
+
+
+def _value_or_shape(value: Any) -> str:
+    return "of_a_shape" if isinstance(value, dict | ShapeTable) else "value"
 
 
 class FrictionTable(Table):
@@ -84,8 +89,14 @@ class ContactTable(Table):
     """1 is linear compliance; larger exponents begin softly."""
     pressure_limit: Positive | None = None
     """The pressure never exceeds it, stress."""
-    gap: Value = 0.0
-    """g, distance to the foundation along the outward normal at rest, length: a number or a formula."""
+    gap: Annotated[
+        Annotated[Value, Tag("value")] | Annotated[ShapeTable, Tag("of_a_shape")], Discriminator(_value_or_shape)
+    ] = 0.0
+    """g, distance to the foundation along the outward normal at rest, length: a number, a formula, or the shape of the
+    foundation."""
+    velocity: Annotated[list[Value], Field(min_length=2, max_length=3)] | None = None
+    """Velocity of the foundation, a number or a formula for each axis: that of a belt, a disc or a drum. Slip is relative to it.
+    Only its part along the surface acts; a foundation that comes nearer has a gap that depends on t."""
     quadrature: Annotated[str, Field(pattern=r"^(nodal|gauss-[1-8])$")] = "nodal"
     """Where the law holds: at the vertices (nodal), or at that many of Gauss's points a direction (gauss-1 to gauss-8)."""
     friction: FrictionTable | None = None

@@ -13,7 +13,8 @@ from warmslip.scene.contact_tables import ContactTable, ExchangeTable, FrictionT
 from warmslip.scene.errors import SceneError, validated
 from warmslip.scene.material_tables import ExpansionTable, HeatingTable, HeatTable, InertiaTable, IsotropicTable
 from warmslip.scene.scene import Scene
-from warmslip.scene.tables import InitialTable, LoadsTable, SupportsTable
+from warmslip.scene.support_tables import SupportsTable
+from warmslip.scene.tables import InitialTable, LoadsTable
 from warmslip.scene.types import Finite, Matrix, NonNegative, Vector
 
 

@@ -65,8 +65,9 @@ def _idle(scene: Scene) -> Iterator[str]:
     """A scene in which nothing happens."""
     loads, initial = scene.loads, scene.initial
     forces = [loads.body, loads.traction, loads.heat_flux, initial.displacement, initial.velocity, scene.supports.moved]
-    gaps = [c.gap for c in scene.contacts if c.stiffness and (isinstance(c.gap, str) or c.gap < 0)]
-    if acts(forces) or gaps or (scene.heat is not None and acts(scene.heat.source)):
+    gaps = [c.gap for c in scene.contacts if c.stiffness and (not isinstance(c.gap, float | int) or c.gap < 0)]
+    belts = [c.velocity for c in scene.contacts]
+    if acts(forces) or acts(belts) or gaps or (scene.heat is not None and acts(scene.heat.source)):
         return
     temperatures = [value for _, value in _numbers(scene)]
     if scene.heat is not None and scene.heat.expansion is not None and scene.moves:

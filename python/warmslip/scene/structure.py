@@ -26,7 +26,7 @@ def structure(scene: Scene) -> str:
     if "heat" in kept:
         kept["heat"] = {key: value for key, value in kept["heat"].items() if key != "source"}
     kept["coupling"] = scene.time.coupling
-    kept["supports"] = [sorted(scene.supports.displacement), sorted(scene.supports.temperature)]
+    kept["supports"] = [scene.supports.pattern(), sorted(scene.supports.temperature)]
     kept["contact"] = [
         {
             "part": contact.part,

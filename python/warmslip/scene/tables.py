@@ -14,7 +14,8 @@ from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Value
 from warmslip.scene.material_tables import HeatTable, InertiaTable, IsotropicTable, RegionTable
 from warmslip.scene.mesh_table import MeshTable
-from warmslip.scene.types import Count, NonNegative, Positive, Table, Values, _listed
+from warmslip.scene.support_tables import SupportsTable
+from warmslip.scene.types import Count, NonNegative, Positive, Table, Values
 
 
 class TimeTable(Table):
@@ -45,29 +46,6 @@ class LoadsTable(Table):
     """fN, force per area, by boundary part: a number or a formula an axis."""
     heat_flux: dict[str, Value] = {}
     """Heat per area and time into the body, by boundary part: a number or a formula."""
-
-
-class SupportsTable(Table):
-    """Parts that are held: names (at zero), or a table of names and what they are held at."""
-
-    displacement: Annotated[
-        Annotated[list[str], Tag("several")] | Annotated[dict[str, Values], Tag("one")], Discriminator(_listed)
-    ] = []
-    """Gamma_D: ["top"] is clamped; { top = ["0.1 * t", 0.0] } follows that displacement."""
-    temperature: Annotated[
-        Annotated[list[str], Tag("several")] | Annotated[dict[str, Value], Tag("one")], Discriminator(_listed)
-    ] = []
-    """["top"] is held at zero; { top = "20 * t" } at that temperature."""
-
-    @property
-    def moved(self) -> dict[str, list[float | str]]:
-        """Given displacement by part, of those that are not simply clamped."""
-        return self.displacement if isinstance(self.displacement, dict) else {}
-
-    @property
-    def warmed(self) -> dict[str, float | str]:
-        """Given temperature by part, of those that are not simply held at zero."""
-        return self.temperature if isinstance(self.temperature, dict) else {}
 
 
 class InitialTable(Table):

@@ -9,6 +9,7 @@ import numpy as np
 
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Expression
+from warmslip.scene.foundation_tables import ShapeTable
 from warmslip.scene.material_tables import (
     ExpansionTable,
     HeatingTable,
@@ -47,6 +48,7 @@ def _parts(scene: SceneTables) -> Iterator[str]:
     named = {
         "supports.displacement": held,
         "supports.temperature": cooled,
+        "supports.springs": list(scene.supports.springs or {}),
         "loads.traction": list(scene.loads.traction),
         "loads.heat_flux": list(scene.loads.heat_flux),
         **{f"{key}.part": [contact.part] for key, contact in contact_keys(scene)},
@@ -59,7 +61,7 @@ def _parts(scene: SceneTables) -> Iterator[str]:
         if len(set(parts)) < len(parts):
             yield f"{key}: a part is named twice; name each once"
     for part in scene.loads.traction:
-        if part in held:
+        if part in scene.supports.clamped:
             yield f"loads.traction.{part}: the part is clamped and a traction on it does nothing; remove one of the two"
     for part in scene.loads.heat_flux:
         if part in cooled:
@@ -80,11 +82,25 @@ def _sizes(scene: SceneTables) -> Iterator[str]:
         "initial.displacement": scene.initial.displacement,
         "initial.velocity": scene.initial.velocity,
         **{f"loads.traction.{part}": value for part, value in scene.loads.traction.items()},
-        **{f"supports.displacement.{part}": value for part, value in scene.supports.moved.items()},
+        **{f"supports.displacement.{part}": v for part, v in scene.supports.moved.items() if isinstance(v, list)},
+        **{f"supports.points.{i}.at": point.at for i, point in enumerate(scene.supports.points or [])},
+        **{
+            f"supports.points.{i}.displacement": point.displacement
+            for i, point in enumerate(scene.supports.points or [])
+        },
+        **{
+            f"supports.springs.{part}.{name}": getattr(table, name)
+            for part, table in (scene.supports.springs or {}).items()
+            for name in ("stiffness", "damping")
+            if isinstance(getattr(table, name), list)
+        },
     }
     for key, value in vectors.items():
+        if key.startswith("supports.") and value is not None and all(one == "free" for one in value):
+            yield f"{key}: every component is free, and nothing is held; leave the support out"
         if value is not None and len(value) != d:
             yield f"{key} has {len(value)} components; a {body} needs {d}"
+    yield from _foundations(scene)
     for key, heat in _heats(scene):
         for name, tensor in (
             (f"{key}.conductivity", heat.conductivity),
@@ -103,6 +119,24 @@ def _sizes(scene: SceneTables) -> Iterator[str]:
                 yield f"initial.{key}.{i}: initial data cannot depend on t; leave it out"
     if isinstance(scene.initial.temperature, str) and Expression(scene.initial.temperature).of_time:
         yield "initial.temperature: initial data cannot depend on t; leave it out"
+
+
+def _foundations(scene: SceneTables) -> Iterator[str]:
+    """The sizes of shapes and velocities of foundations."""
+    d, body = scene.mesh.dim, scene.mesh.name
+    for key, contact in contact_keys(scene):
+        vectors: dict[str, Any] = {f"{key}.velocity": contact.velocity}
+        if isinstance(contact.gap, ShapeTable):
+            vectors |= {f"{key}.gap.{name}": getattr(contact.gap, name) for name in ("at", "normal", "axis")}
+            if d == 2 and contact.gap.axis is not None:
+                yield f"{key}.gap.axis: in the plane the axis is that of z; leave it out"
+            if d == 3 and contact.gap.axis is None and contact.gap.spatial_axis:
+                yield f"{key}.gap.axis: in space a {contact.gap.shape} needs the direction of its axis; give one"
+        for name, value in vectors.items():
+            if value is not None and len(value) != d:
+                yield f"{name} has {len(value)} components; a {body} needs {d}"
+        if contact.velocity is not None and contact.friction is None:
+            yield f"{key}.velocity: nothing feels the motion of a foundation without friction; give a table friction or remove it"
 
 
 def _heats(scene: SceneTables) -> list[tuple[str, HeatTable | RegionHeatTable]]:
@@ -204,6 +238,8 @@ def _blocks(scene: SceneTables) -> Iterator[str]:
             "loads.body": scene.loads.body,
             "loads.traction": scene.loads.traction,
             "supports.displacement": scene.supports.displacement,
+            "supports.points": scene.supports.points,
+            "supports.springs": scene.supports.springs,
             "initial.displacement": scene.initial.displacement,
             "initial.velocity": scene.initial.velocity,
             "heat.expansion": heat and heat.expansion,
@@ -218,7 +254,7 @@ def _blocks(scene: SceneTables) -> Iterator[str]:
             yield (
                 "inertia.density: without inertia, viscosity and elasticity there is no momentum operator; give one of them"
             )
-        if not scene.supports.displacement and not any(contact.stiffness for contact in scene.contacts):
+        if not scene.supports.hold and not any(contact.stiffness for contact in scene.contacts):
             yield (
                 "supports.displacement: nothing holds the body: it has no support, no inertia and no contact; "
                 "clamp a part, give inertia.density > 0 or a [contact] that it rests on"
@@ -307,7 +343,7 @@ def _plane(scene: SceneTables) -> Iterator[str]:
 
 # tables whose texts are formulas, but for names
 FORMULAS = ("loads", "supports", "initial", "contact", "heat", "regions")
-NAMES = ("part", "quadrature", "assumption")
+NAMES = ("part", "quadrature", "assumption", "shape")
 
 
 def formulas(tables: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -324,5 +360,5 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
     elif isinstance(value, list) and key not in ("supports.displacement", "supports.temperature"):
         for i, one in enumerate(value):
             yield from _texts(f"{key}.{i}", one)
-    elif isinstance(value, str):
+    elif isinstance(value, str) and not (value == "free" and key.startswith("supports.")):
         yield key, value

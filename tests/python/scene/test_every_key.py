@@ -54,7 +54,12 @@ WHOLE: dict[str, Any] = {
         "heating": {"thermodynamic": True},
     },
     "loads": {"body": [0.0, "t"], "traction": {"left": [1.0, 0.0]}, "heat_flux": {"left": 1.0}},
-    "supports": {"displacement": {"top": [0.0, "t"]}, "temperature": {"top": "t"}},
+    "supports": {
+        "displacement": {"top": [0.0, "t"], "right": {"normal": "0.1 * t"}},
+        "points": [{"at": [0.0, 1.0], "displacement": [0.0, "free"]}],
+        "springs": {"left": {"stiffness": 1.0, "normal_stiffness": 2.0, "damping": 3.0, "normal_damping": 4.0}},
+        "temperature": {"top": "t"},
+    },
     "contact": CONTACT,
     "regions": {
         "insert": {
@@ -79,14 +84,43 @@ GRADED = {
     "heat": {"conductivity": 1.0},
 }
 ADAPTIVE = FILE | {"time": {"end": 1.0, "steps": 2, "tolerance": 0.1}}
-SEVERAL = WHOLE | {"contact": [CONTACT, {"part": "right", "stiffness": 1.0}]}
-SCENES = {"whole": WHOLE, "file": FILE, "graded": GRADED, "adaptive": ADAPTIVE, "several": SEVERAL}
+CYLINDER = {"shape": "cylinder", "at": [0.0, 0.0, "-1 - t"], "radius": 1.0, "axis": [0.0, 1.0, 0.0]}
+WEDGE = {"shape": "wedge", "at": [0.5, 0.0, "-t"], "normal": [0.0, 0.0, 1.0], "axis": [0.0, 1.0, 0.0], "angle": 90.0}
+FOUNDATIONS = {
+    "mesh": {"shape": "cube", "n": 2},
+    "time": {"end": 1.0, "steps": 2},
+    "elasticity": {"young": 1.0, "poisson": 0.3, "assumption": "solid"},
+    "supports": {"displacement": ["front"]},
+    "contact": [
+        {
+            "part": "bottom",
+            "stiffness": 1.0,
+            "gap": CYLINDER,
+            "velocity": [1.0, 0.0, "t"],
+            "friction": {"coefficient": 0.1},
+        },
+        {"part": "top", "stiffness": 1.0, "gap": WEDGE},
+    ],
+}
+SEVERAL = WHOLE | {
+    "contact": [CONTACT, {"part": "left", "stiffness": 1.0}],
+    "supports": {"displacement": {"top": [0.0, "t"]}, "temperature": {"top": "t"}},
+}
+SCENES = {
+    "whole": WHOLE,
+    "file": FILE,
+    "graded": GRADED,
+    "adaptive": ADAPTIVE,
+    "several": SEVERAL,
+    "foundations": FOUNDATIONS,
+}
 NEVER = [True, "no such thing!", {"surprise": 1.0}, [], [[]], [1.0] * 7, math.nan, math.inf, -math.inf, None, 10**400]
 HOLDS: dict[str, list[int]] = {  # which of those a key can hold
     "title": [1],
     "contact": [3],
     "supports.displacement": [3],
     "supports.temperature": [3],
+    "supports.points": [3],
     "mesh.graded_to": [3],
     "time.graded_to": [3],
     "heat.heating.thermodynamic": [0],

@@ -1,0 +1,44 @@
+#include "warmslip/physics/supports.hpp"
+
+#include "warmslip/physics/problem.hpp"
+
+namespace warmslip {
+
+template <int d>
+std::map<Index, Tensor2<d>> held_directions(const Problem<d>& problem) {
+  std::map<Index, Tensor2<d>> held;
+  for (const HeldNode<d>& node : problem.held_nodes) held[node.node] = node.held;
+  for (const std::string& name : problem.prescribed_displacement)
+    for (const Index node : problem.mesh->part(name).nodes.reshaped()) held[node] = Tensor2<d>::Identity();
+  return held;
+}
+
+template <int d>
+ResistedDirections<d> resisted_directions(const Problem<d>& problem) {
+  ResistedDirections<d> out;
+  const auto add = [&](Index node, const Tensor2<d>& directions) {
+    for (int a = 0; a < d; ++a)
+      if (!directions.row(a).isZero(0)) {
+        out.nodes.push_back(node);
+        out.rows.push_back(directions.row(a).transpose());
+      }
+  };
+  for (const auto& [node, directions] : held_directions(problem)) add(node, directions);
+  for (const PartSprings<d>& springs : problem.springs) {
+    const Facets<d>& facets = problem.mesh->part(springs.part);
+    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
+      const Point<d> nu = area_normal(*problem.mesh, facets, f).normalized();
+      const Tensor2<d> tensor = springs.stiffness.on(nu) + springs.damping.on(nu);
+      if (tensor.isZero(0)) continue;
+      for (int i = 0; i < d; ++i) add(facets.nodes(f, i), tensor / tensor.norm());
+    }
+  }
+  return out;
+}
+
+template std::map<Index, Tensor2<2>> held_directions(const Problem<2>&);
+template std::map<Index, Tensor2<3>> held_directions(const Problem<3>&);
+template ResistedDirections<2> resisted_directions(const Problem<2>&);
+template ResistedDirections<3> resisted_directions(const Problem<3>&);
+
+}  // namespace warmslip

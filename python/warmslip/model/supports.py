@@ -1,0 +1,258 @@
+"""What supports hold: for every node the directions and the displacement along them, supports that meet joined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from warmslip.model.loads import Data, Loads, given_displacement, of_time
+from warmslip.model.materials import of_dim
+from warmslip.scene.scene import Scene
+from warmslip.scene.support_tables import NormalTable
+from warmslip.typing import Array
+
+EDGE = np.cos(np.deg2rad(20))  # facets whose normals differ more from their mean hold their node one by one
+EXACT = 1e-12  # entries of directions that are nearer to 0 or 1 are rounding
+AGREE = 1e-9  # relative difference of displacements that are the same
+
+Evaluate = Callable[[Data, Array, float, int, str], Array]
+
+
+@dataclass(frozen=True)
+class Support:
+    """One entry of [supports]: nodes (n,), each with `directions` (n, d) along which one component of its data is given.
+
+    `components` counts those of the data, and `component` says which of them belongs to this direction.
+    """
+
+    key: str
+    name: str
+    nodes: Array
+    directions: Array
+    given: Data
+    components: int
+    component: int
+
+
+def supports(scene: Scene, loads: Loads, mesh: Any) -> list[Support]:
+    """The supports of a scene on its mesh; what a function of `loads` gives takes the place of what the scene states.
+
+    Raises
+    ------
+    ValueError
+        For a point that is no place of the mesh.
+    """
+    d, out = scene.mesh.dim, []
+    table, nodes = scene.supports, np.asarray(mesh.nodes)
+    for part in table.displacement:
+        held = table.moved.get(part, [0.0] * d)
+        key, name = f"supports.displacement.{part}", f"'{part}'"
+        given = loads.displacement.get(part, 0.0)
+        if isinstance(held, NormalTable):
+            out += [
+                Support(key, name, at, normals, given, 1, 0)
+                for at, normals in _normals(len(nodes), np.asarray(mesh.parts[part]), mesh.area_normals(part))
+            ]
+            continue
+        at = np.unique(np.asarray(mesh.parts[part]))
+        out += [
+            Support(key, name, at, np.tile(np.eye(d)[i], (len(at), 1)), given, d, i)
+            for i, value in enumerate(held)
+            if value != "free"
+        ]
+    size = float(np.ptp(nodes, axis=0).max())
+    for number, point in enumerate(table.points or []):
+        distance = np.linalg.norm(nodes - point.at, axis=1)
+        nearest = int(distance.argmin())
+        if distance[nearest] > 0.5 * size:
+            where = ", ".join(f"{x:g}" for x in point.at)
+            raise ValueError(
+                f"supports.points.{number}: the nearest node of ({where}) is {distance[nearest]:.3g} away; correct the place"
+            )
+        held = point.displacement or [0.0] * d
+        given = given_displacement(held)
+        out += [
+            Support(f"supports.points.{number}", f"points.{number}", np.array([nearest]), np.eye(d)[[i]], given, d, i)
+            for i, value in enumerate(held)
+            if value != "free"
+        ]
+    return out
+
+
+def _normals(nodes: int, facets: Any, area: Array) -> list[tuple[Array, Array]]:
+    """Nodes of a part and a normal of each; where facets meet at an edge, their nodes come once for every facet."""
+    unit = area / np.linalg.norm(area, axis=1, keepdims=True)
+    mean = np.zeros((nodes, facets.shape[1]))
+    for i in range(facets.shape[1]):
+        np.add.at(mean, facets[:, i], area)
+    at = np.unique(facets)
+    size = np.linalg.norm(mean, axis=1, keepdims=True)
+    mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
+    turned = np.einsum("fa,fia->fi", unit, mean[facets]) < EDGE
+    edge = np.zeros(nodes, dtype=bool)
+    edge[facets[turned]] = True
+    out = [(at[~edge[at]], _exact(mean[at[~edge[at]]]))]
+    for i in range(facets.shape[1]):
+        here = edge[facets[:, i]]
+        out.append((facets[here, i], _exact(unit[here])))
+    return [(where, normals) for where, normals in out if len(where)]
+
+
+def _exact(values: Array) -> Array:
+    """Entries that are 0 or +-1 but for rounding made so."""
+    near = np.round(values)
+    return np.where(np.abs(values - near) < EXACT, near, values)
+
+
+@dataclass(frozen=True)
+class Supports:
+    """All supports of a problem together.
+
+    Parameters
+    ----------
+    parts : list of Support
+        In the order of the scene.
+    positions : array
+        Positions of all nodes, (nodes, d), length.
+    """
+
+    parts: list[Support]
+    positions: Array
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Nodes that are held in some direction, (n,), in rising order."""
+        return np.unique(np.concatenate([s.nodes for s in self.parts])) if self.parts else np.empty(0, dtype=int)
+
+    @cached_property
+    def _forms(self) -> tuple[Any, Array, Any, Any]:
+        """Of every direction of a support, node by node: its node in `nodes`, the direction, its support, where it stood."""
+        where = np.concatenate([np.searchsorted(self.nodes, s.nodes) for s in self.parts])
+        number = np.concatenate([np.full(len(s.nodes), i) for i, s in enumerate(self.parts)])
+        order = np.argsort(where, kind="stable")
+        return where[order], np.concatenate([s.directions for s in self.parts])[order], number[order], order
+
+    @cached_property
+    def _groups(self) -> list[tuple[Any, Any, Array]]:
+        """Nodes with equally many conditions: their places in `nodes` (n,), forms (n, m) and pseudo-inverses (n, d, m)."""
+        if not self.parts:
+            return []
+        where, directions, _, _ = self._forms
+        first, count = np.searchsorted(where, np.arange(len(self.nodes))), np.bincount(where, minlength=len(self.nodes))
+        out = []
+        for m in np.unique(count):
+            at = np.flatnonzero(count == m)
+            forms = first[at][:, None] + np.arange(m)
+            out.append((at, forms, np.linalg.pinv(directions[forms], rcond=1e-9)))
+        return out
+
+    @cached_property
+    def projectors(self) -> Array:
+        """Orthogonal projectors onto the held directions of `nodes`, (n, d, d)."""
+        d = self.positions.shape[1]
+        out = np.zeros((len(self.nodes), d, d))
+        if self.parts:
+            directions = self._forms[1]
+            for at, forms, inverse in self._groups:
+                full = inverse @ directions[forms]
+                out[at] = _exact((full + full.swapaxes(1, 2)) / 2)
+        return out
+
+    @cached_property
+    def still(self) -> Supports:
+        """Those that do not move."""
+        return Supports([support for support in self.parts if not of_time(support.given)], self.positions)
+
+    @property
+    def meet(self) -> bool:
+        """Whether a node has more conditions than one for each axis it is held along."""
+        return len(self._groups) > 0 and sum(len(s.nodes) for s in self.parts) > round(
+            float(self.projectors.trace(axis1=1, axis2=2).sum())
+        )
+
+    def released(self, values: Array) -> Array:
+        """Values at `nodes`, (n, d), without what lies in held directions."""
+        return np.asarray(values - np.einsum("nab,nb->na", self.projectors, values))
+
+    def partly_clamped(self, clamped: list[str], parts: Any) -> list[tuple[int, Array]]:
+        """Nodes that lie on no clamped part, with their projectors."""
+        on_clamped = np.zeros(len(self.positions), dtype=bool)
+        for part in clamped:
+            on_clamped[np.unique(parts[part])] = True
+        return [
+            (int(node), projector)
+            for node, projector in zip(self.nodes, self.projectors, strict=True)
+            if not on_clamped[node]
+        ]
+
+    @property
+    def held(self) -> Any:
+        """Which of all nodes are held in every direction, (nodes,)."""
+        out = np.zeros(len(self.positions), dtype=bool)
+        out[self.nodes[(self.projectors == np.eye(self.positions.shape[1])).all(axis=(1, 2))]] = True
+        return out
+
+    @property
+    def of_time(self) -> bool:
+        """Whether a support moves."""
+        return any(of_time(support.given) for support in self.parts)
+
+    def displacement(self, t: float, evaluate: Evaluate) -> Array:
+        """The given displacement of `nodes` at time t, zero in directions that are free, (n, d), length.
+
+        Raises
+        ------
+        ValueError
+            Where supports contradict each other.
+        """
+        out = np.zeros((len(self.nodes), self.positions.shape[1]))
+        if not self.parts:
+            return out
+        where, directions, number, order = self._forms
+        given = np.concatenate(self._values(t, evaluate))[order]
+        scale = np.abs(given).max()
+        for at, forms, inverse in self._groups:
+            out[at] = np.einsum("nam,nm->na", inverse, given[forms])
+            left = np.abs(np.einsum("nma,na->nm", directions[forms], out[at]) - given[forms]).max(axis=1)
+            if scale > 0 and (left > AGREE * scale).any():
+                raise ValueError(self._conflict(int(at[left.argmax()]), where, number, given, t))
+        return out
+
+    def _values(self, t: float, evaluate: Evaluate) -> list[Array]:
+        known: dict[tuple[str, int], Array] = {}  # the components of one support are evaluated together
+        out = []
+        for support in self.parts:
+            key = support.key, id(support.nodes)
+            if key not in known:
+                known[key] = evaluate(support.given, self.positions[support.nodes], t, support.components, support.key)
+            out.append(known[key][:, support.component])
+        return out
+
+    def _conflict(self, node: int, where: Array, number: Array, given: Array, t: float) -> str:
+        here = np.flatnonzero(where == node)
+        names = list(dict.fromkeys(self.parts[i].name for i in number[here]))
+        place = ", ".join(f"{x:.4g}" for x in self.positions[self.nodes[node]])
+        values = " and ".join(f"{given[i]:.4g}" for i in here)
+        return (
+            f"supports: {' and '.join(names)} hold their common node at ({place}) at displacements that contradict each other "
+            f"at t = {t:.4g} ({values}); make them agree there, or leave a component free"
+        )
+
+
+def part_springs(scene: Scene) -> list[Any]:
+    """The springs and dashpots of a scene as values of the core."""
+    d = scene.mesh.dim
+    return [
+        of_dim("PartSprings", d)(
+            part=part,
+            stiffness=table.along("stiffness", d),
+            normal_stiffness=table.normal_stiffness,
+            damping=table.along("damping", d),
+            normal_damping=table.normal_damping,
+        )
+        for part, table in (scene.supports.springs or {}).items()
+    ]

@@ -1,0 +1,195 @@
+"""Rollers, symmetry planes, smooth guides, held points and springs. `python test_component_supports.py D` checks on its ranks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from support.boxes import along, completed, elasticity, field, fields, misses, scene, turned
+from support.ranked import Checks
+
+from warmslip import _core, discretise
+from warmslip.simulation.simulation import Simulation
+
+check = Checks()
+SIDES = {2: ["left"], 3: ["left", "front"]}  # one for each axis but the last
+
+
+def planes(d: int, value: Any = 0.0) -> dict[str, Any]:
+    """Symmetry planes across every axis but the last."""
+    return {side: [value if i == axis else "free" for i in range(d)] for axis, side in enumerate(SIDES[d])}
+
+
+def guides(d: int) -> dict[str, Any]:
+    return {side: {"normal": 0.0} for side in SIDES[d]}
+
+
+def pressed(d: int, displacement: Any, n: int = 4, **tables: Any) -> Any:
+    return scene(
+        d,
+        n,
+        **{"elasticity": elasticity(d, 10.0, 0.3), "supports": {"displacement": displacement}} | tables,
+    )
+
+
+@check
+def a_block_between_rollers_strains_evenly(d: int) -> None:
+    ends = {"bottom": along(d, 0.0, "free"), "top": along(d, "-0.01 * t", "free")}
+    if d == 3:
+        ends = {"bottom": ["free", "free", 0.0], "top": ["free", "free", "-0.01 * t"]}
+    simulation = completed(pressed(d, planes(d) | ends))
+    x = np.asarray(simulation.discretisation.mesh.nodes)
+    sideways = 0.01 * (0.3 / 0.7 if d == 2 else 0.3)  # plane strain, and uniaxial stress in space
+    exact = x * np.array([sideways] * (d - 1) + [-0.01])
+    assert np.abs(field(simulation, "u") - exact).max() <= 1e-15
+
+
+@check
+def guides_may_be_inclined(d: int) -> None:
+    """The body, its supports and its loads turned: the turned answer, with inertia, viscosity and heat that strains."""
+    for coupling in ("staggered", "monolithic"):
+        ends = {"bottom": {"normal": 0.0}, "top": {"normal": "0.01 * sin(3 * t)"}}
+        one = pressed(
+            d,
+            guides(d) | ends,
+            n=3,
+            time={"steps": 4, "coupling": coupling},
+            inertia={"density": 1.0},
+            viscosity={"lame": [0.2, 0.3]},
+            heat={"conductivity": 1.0, "source": 2.0, "expansion": {"tensor": 0.3}, "heating": {"tensor": -0.2}},
+            supports={"displacement": guides(d) | ends, "temperature": ["top"]},
+            loads={"body": along(d, -0.5, 0.3)},
+        )
+        angle = 0.6
+        turn = np.eye(d)
+        turn[np.ix_([0, d - 1], [0, d - 1])] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        if d == 3:
+            turn = turn @ np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]])
+        upright = completed(one)
+        other, mesh = turned(one, turn)
+        inclined = completed(other, mesh=mesh)
+        expected = fields(upright)
+        for name in ("u", "w"):
+            expected[name] = expected[name] @ turn.T
+        assert max(misses(fields(inclined), expected).values()) <= 1e-13
+        for run in (upright, inclined):
+            assert abs(run.statistics.residuals["energy"]) <= 1e-14
+        reactions = [run.discretisation.field(run.stepper.reactions) for run in (upright, inclined)]
+        assert np.abs(reactions[1] - reactions[0] @ turn.T).max() <= 1e-12 * np.abs(reactions[0]).max()
+
+
+def mirrored(d: int, mesh: Any) -> Any:
+    """The mesh with its mirror images across every axis but the last, on the unit box."""
+    nodes, cells, parts = (
+        np.asarray(mesh.nodes),
+        np.asarray(mesh.cells),
+        {k: np.asarray(v) for k, v in mesh.parts.items()},
+    )
+    for axis in range(d - 1):
+        image = nodes * np.where(np.arange(d) == axis, -1.0, 1.0)
+        distance, same = cKDTree(nodes).query(image)
+        new = np.flatnonzero(distance > 1e-9)
+        number = np.where(distance > 1e-9, 0, same)
+        number[new] = len(nodes) + np.arange(len(new))
+        nodes = np.vstack([nodes, image[new]])
+        turned_over = number[cells]
+        turned_over[:, :2] = turned_over[:, 1::-1].copy()
+        cells = np.vstack([cells, turned_over])
+        parts = {
+            name: np.vstack([facets, number[facets]]) for name, facets in parts.items() if name in ("bottom", "top")
+        }
+    return getattr(_core, f"Mesh{d}").from_lists(nodes, cells, parts)
+
+
+@check
+def a_part_of_a_body_on_symmetry_planes_is_the_whole_body(d: int) -> None:
+    """Half a block in the plane and a quarter in space on a rounded foundation, with friction."""
+    top = {"top": ["free"] * (d - 1) + ["-0.05 * t"]}
+    pins = [{"at": [0.0] * (d - 1) + [1.0], "displacement": [0.0] * (d - 1) + ["free"]}]
+    if d == 3:  # and against a turn about the last axis
+        pins.append({"at": [1.0, 0.0, 1.0], "displacement": ["free", 0.0, "free"]})
+    for quadrature in ("nodal", "gauss-2"):
+        for stiffness in ("rigid", 100.0):
+            if (d, quadrature) == (3, "gauss-2"):
+                continue  # Gauss points of a triangle do not mirror
+            contact = {
+                "part": "bottom",
+                "stiffness": stiffness,
+                "quadrature": quadrature,
+                "friction": {"coefficient": 0.3},
+                "gap": " + ".join(f"0.1 * {x}**2" for x in "xy"[: d - 1]),
+            }
+            one = pressed(d, planes(d) | top, n={2: 6, 3: 2}[d], contact=contact)
+            part = completed(one)
+            other = one.override(supports={"displacement": top, "points": pins})
+            whole = completed(other, mesh=mirrored(d, part.discretisation.mesh))
+            nodes = [np.asarray(run.discretisation.mesh.nodes) for run in (part, whole)]
+            distance, nearest = cKDTree(nodes[1]).query(nodes[0])
+            assert distance.max() <= 1e-12
+            difference = np.abs(field(whole, "u")[nearest] - field(part, "u")).max()
+            assert difference <= 1e-12 * np.abs(field(part, "u")).max(), (quadrature, stiffness, difference)
+
+
+@check
+def springs_and_dashpots_are_what_they_say(d: int) -> None:
+    """A block between a spring and a load: the spring's shortening, and the creep of a dashpot."""
+    load = -2.0
+    held = {
+        "displacement": planes(d),
+        "springs": {"bottom": {"normal_stiffness": 40.0, "normal_damping": 8.0}},
+    }
+    one = pressed(d, {}, supports=held, loads={"traction": {"top": along(d, load)}}, time={"end": 2.0, "steps": 50})
+    simulation = completed(one)
+    k, displacement = 2.0 / 50, 0.0
+    for _ in range(50):  # (40 + 8/k) u_n = load + 8/k u_{n-1}, the body follows at once
+        displacement = (load + 8.0 / k * displacement) / (40.0 + 8.0 / k)
+    x = np.asarray(simulation.discretisation.mesh.nodes)
+    u = field(simulation, "u")[:, -1]
+    modulus = 10.0 / (1 - 0.3**2) if d == 2 else 10.0
+    assert np.abs(u - (displacement + load / modulus * x[:, -1])).max() <= 1e-12
+    tensor = {"stiffness": along(d, 40.0), "damping": along(d, 8.0)}
+    other = completed(pressed(d, {}, supports=held | {"springs": {"bottom": tensor}}, loads=one.loads, time=one.time))
+    assert np.abs(field(other, "u")[:, -1] - u).max() <= 1e-12
+
+
+@check
+def what_supports_leave_free_is_seen(d: int) -> None:
+    """A body without inertia that its rollers let slide is refused; with inertia it slides."""
+    sliding = pressed(d, {"bottom": along(d, 0.0, "free") if d == 2 else ["free", "free", 0.0]})
+    with pytest.raises(ValueError, match="nothing holds the body"):
+        Simulation(sliding)
+    for steps in (4, 1):  # short steps and long ones
+        free = sliding.override(
+            **{"inertia.density": 1e-3, "loads.body": along(d, 0.0, 0.5), "time.steps": steps, "time.end": 1e4}
+        )
+        simulation = completed(free)
+        u = field(simulation, "u")
+        n, k = steps, 1e4 / steps
+        exact = 500.0 * k * k * n * (n + 1) / 2
+        assert np.abs(u[:, 0] - exact).max() <= 1e-13 * exact
+        assert np.abs(u[:, 1:]).max() <= 1e-14 * exact
+        assert simulation.discretisation.field(simulation.stepper.strained) is not None
+
+
+def test_supports_that_meet() -> None:
+    """They are joined where they agree, in any order, and refused with the place where they do not."""
+    agree = {"left": ["0.1 * t", "free"], "top": ["0.1 * t", "-0.02 * t"], "bottom": [0.0, "free"]}
+    with pytest.raises(ValueError, match=r"'left' and 'bottom' hold their common node at \(0, 0\).*contradict"):
+        discretise(pressed(2, agree))
+    agree["bottom"] = ["free", 0.0]
+    results = [field(completed(pressed(2, dict(order))), "u") for order in (agree.items(), reversed(agree.items()))]
+    assert np.abs(results[0] - results[1]).max() <= 1e-16
+    assert results[0][0] == pytest.approx([0.1, 0.0], abs=1e-15)
+
+
+def test_every_component_free_is_no_support() -> None:
+    with pytest.raises(ValueError, match="every component is free"):
+        pressed(2, {"left": ["free", "free"]})
+
+
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
+
+if __name__ == "__main__":
+    check.main()

@@ -1,0 +1,137 @@
+"""Foundations that move along and have a shape. `python test_moving_foundations.py D` checks on the ranks it has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support.boxes import along, completed, elasticity, field, forces_of, scene
+from support.ranked import Checks
+
+from warmslip import discretise
+
+check = Checks()
+
+
+def block(d: int, velocity: Any, initial: Any, **contact: Any) -> Any:
+    """A block with a weight on a foundation, which is the motor of the scene or the other way round."""
+    return scene(
+        d,
+        3 if d == 2 else 2,
+        time={"end": 0.4, "steps": 20},
+        inertia={"density": 1.0},
+        elasticity=elasticity(d, 1000.0, 0.3),
+        viscosity={"lame": [1.0, 1.0]},
+        heat={"conductivity": 0.1},
+        loads={"body": along(d, -2.0)},
+        initial={"velocity": initial},
+        contact={
+            "part": "bottom",
+            "friction": {"coefficient": 0.4},
+            "friction_heating": {"share": 0.5},
+            "heat_exchange": {"conductance": 0.1, "per_pressure": 0.2, "foundation_temperature": 1.0},
+            "velocity": velocity,
+        }
+        | contact,
+    )
+
+
+@check
+def a_belt_and_a_thrown_block_are_one_motion(d: int) -> None:
+    """In the frame of the belt the block is thrown: the same forces and temperatures, and displacements that differ by V t."""
+    speed = np.array([0.3, *[0.1] * (d - 2), 0.0])
+    rest = [0.0] * d
+    for quadrature in ("nodal", "gauss-2")[: 4 - d]:  # in space, forces at Gauss points depend on the path
+        for stiffness in ("rigid", 1000.0):
+            runs = [
+                completed(block(d, velocity, initial, quadrature=quadrature, stiffness=stiffness), digits=6)
+                for velocity, initial in ((speed.tolist(), rest), (rest, (-speed).tolist()))
+            ]
+            belt, thrown = runs
+            assert np.abs(field(belt, "u") - field(thrown, "u") - 0.4 * speed).max() <= 1e-11
+            assert np.abs(field(belt, "theta") - field(thrown, "theta")).max() <= 1e-11
+            assert np.abs(forces_of(belt) - forces_of(thrown)).max() <= 1e-9 * np.abs(forces_of(belt)).max()
+
+
+@check
+def the_belt_pays_for_what_it_moves(d: int) -> None:
+    """Its work is the friction's heat and the energy of the block, in the balance of every step."""
+    paid: list[float] = []
+    one = block(d, along(d, 0.0, "0.3 + 0.1 * t"), [0.0] * d, stiffness=1000.0)
+    run = completed(one, digits=6, each=lambda _, report: paid.append(report.balances.foundation_work))
+    assert sum(paid) > 0.05
+    assert run.statistics.residuals["energy"] <= 1e-14
+
+
+@check
+def velocities_across_the_surface_do_nothing(d: int) -> None:
+    still, rising = (completed(block(d, along(d, up, 0.2), [0.0] * d, stiffness=1000.0), digits=6) for up in (0.0, 3.0))
+    assert np.abs(field(still, "u") - field(rising, "u")).max() <= 1e-14
+
+
+@check
+def shapes_are_the_formulas_of_their_gaps(d: int) -> None:
+    """Below a flat face: parabola-free formulas of circle, plane and wedge, at a place that moves."""
+    x = ["x", "y"][: d - 1]
+    middle = [0.4, 0.5][: d - 1]
+    square = " + ".join(f"({a} - {b})**2" for a, b in zip(x, middle, strict=True))
+    center = [*middle, "-2.1 + 0.1 * t"]
+    tilt = [0.1, *[0.0] * (d - 2), 1.0]
+    edge = {"axis": [0.0, 1.0, 0.0]} if d == 3 else {}
+    shapes = {
+        f"2.1 - 0.1 * t - sqrt(4 - ({square}))": {
+            "shape": "cylinder" if d == 2 else "sphere",
+            "at": center,
+            "radius": 2.0,
+        },
+        "0.01 + 0.1 * x": {"shape": "plane", "at": along(d, -0.01), "normal": tilt},
+        "0.02 + abs(x - 0.4)": {"shape": "wedge", "at": along(d, -0.02, 0.4), "normal": along(d, 3.0), "angle": 90.0}
+        | edge,
+    }
+    if d == 3:
+        shapes["2.05 - sqrt(4 - (x - 0.5)**2)"] = {
+            "shape": "cylinder", "at": [0.5, 7.0, -2.05], "radius": 2.0, "axis": [0.0, 2.0, 0.0],
+        }  # fmt: skip
+    for formula, shape in shapes.items():
+        gaps = []
+        for gap in (formula, shape):
+            d_ = discretise(
+                scene(
+                    d, 4, elasticity=elasticity(d, 1.0, 0.3), contact={"part": "bottom", "stiffness": 1.0, "gap": gap}
+                )
+            )
+            gaps.append([d_.load_vectors.on_points("gap", t) for t in (0.0, 1.0)])
+        assert np.abs(np.subtract(*gaps)).max() <= 1e-14, formula
+
+
+def test_what_a_shape_does_not_meet_is_away() -> None:
+    """Points beside a circle, and points that face away from it, touch nothing."""
+    gap = {"shape": "cylinder", "at": [0.5, -0.3], "radius": 0.2}
+    for part, reach in (("bottom", 0.09), ("top", 0.3), ("left", 0.3)):
+        d = discretise(
+            scene(2, 8, elasticity=elasticity(2, 1.0, 0.3), contact={"part": part, "stiffness": 1.0, "gap": gap})
+        )
+        assert d.load_vectors.on_points("gap", 0.0).min() > reach, part
+
+
+@pytest.mark.parametrize(
+    ("contact", "message"),
+    [
+        ({"velocity": [1.0, 0.0]}, "nothing feels the motion"),
+        ({"velocity": [1.0, 0.0, 0.0], "friction": {"coefficient": 0.1}}, "has 3 components"),
+        ({"gap": {"shape": "sphere", "at": [0.0, 0.0]}}, "a sphere needs its radius"),
+        ({"gap": {"shape": "plane", "at": [0.0, 0.0], "normal": [0.0, 0.0]}}, "zero vector"),
+        ({"gap": {"shape": "plane", "at": [0.0, 0.0], "normal": [0.0, 1.0], "radius": 1.0}}, "has no radius"),
+        ({"gap": {"shape": "cylinder", "at": [0.0, 0.0], "radius": 1.0, "axis": [0.0, 1.0]}}, "axis is that of z"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(contact: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        scene(2, 2, elasticity=elasticity(2, 1.0, 0.3), contact={"part": "bottom", "stiffness": 1.0} | contact)
+
+
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
+
+if __name__ == "__main__":
+    check.main()
