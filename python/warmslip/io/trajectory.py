@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,8 +11,10 @@ import h5py
 import numpy as np
 
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
+from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
+from warmslip.scene.scene import Scene
 from warmslip.typing import Array
 
 CONTACT = {"force": ("f", "axes"), "displacement": ("f", "axes"), "status": ("i",), "gap": ("f",)}
@@ -75,6 +78,7 @@ class Trajectory:
     def __init__(self, path: str | Path) -> None:
         """Raises OSError when the file cannot be opened, ValueError when it is no trajectory or a damaged one."""
         self.path = Path(path)
+        self._folder: tempfile.TemporaryDirectory[str] | None = None  # of a mesh file that is gone
         if not self.path.is_file():
             inside = self.path / "trajectory.h5"
             cure = f"give '{inside}'" if inside.is_file() else THE_FILE
@@ -164,19 +168,28 @@ class Trajectory:
     def discretisation(self) -> Discretisation:
         """The scene assembled again on this process, with the loads and laws that it states.
 
-        Raises ValueError when that is not the mesh of the run, as its file has changed since.
+        A mesh file is that of the run, also where it is gone or has changed since. Raises ValueError when that is not the mesh of
+        the run.
         """
         from mpi4py import MPI
 
-        scene = build(self.scene)
-        if scene.mesh.file is not None and scene.digest() != self._read.attrs.get("digest"):
-            raise ValueError(
-                f"{self.path}: mesh file '{scene.mesh.file}' has changed since the run; put it back as it was"
-            )
-        found = discretise(scene, comm=MPI.COMM_SELF)
+        found = discretise(self._scene(), comm=MPI.COMM_SELF)
         if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
             raise ValueError(f"{self.path}: it was run on another mesh than its scene gives; read it through Python")
         return found
+
+    def _scene(self) -> Scene:
+        """The scene of the run. A mesh file that is gone or has changed is written anew from what the trajectory holds."""
+        name, stored = self.scene["mesh"].get("file"), self._read.get("mesh/file")
+        if name is None or stored is None:
+            return build(self.scene)
+        content = np.asarray(stored).tobytes()
+        if not (path := files.find(name)).is_file() or path.read_bytes() != content:
+            if self._folder is None:
+                self._folder = tempfile.TemporaryDirectory(prefix="warmslip-")
+            path = Path(self._folder.name) / Path(name).name
+            path.write_bytes(content)
+        return build(self.scene | {"mesh": self.scene["mesh"] | {"file": str(path)}})
 
     @property
     def functions(self) -> list[str]:
@@ -214,6 +227,8 @@ class Trajectory:
     def close(self) -> None:
         """Closes the file; a `with` block does."""
         self._file.close()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def __enter__(self) -> Self:
         return self

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from warmslip._core import Balances
+from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
@@ -92,6 +93,9 @@ class TrajectoryWriter:
         file["mesh/cells"] = discretisation.mesh.cells
         for name, facets in discretisation.mesh.parts.items():
             file[f"mesh/parts/{name}"] = facets
+        if discretisation.scene.mesh.file is not None:  # so that the results can be read elsewhere
+            stored = np.frombuffer(files.find(discretisation.scene.mesh.file).read_bytes(), dtype="u1")
+            file.create_dataset("mesh/file", data=stored, compression="gzip", compression_opts=1)
         file["contact/positions"] = discretisation.surface.positions
         file["contact/normals"] = discretisation.surface.normals
         file["contact/weights"] = discretisation.surface.weights

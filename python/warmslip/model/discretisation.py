@@ -20,14 +20,18 @@ from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, data, evaluate
 from warmslip.model.materials import contact_part, materials, of_dim
 from warmslip.model.meshes import make_mesh
+from warmslip.model.point_location import interpolated
 from warmslip.model.prescribed import PrescribedContact
 from warmslip.model.supports import Supports, part_springs, supports
+from warmslip.scene import stored_state
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
 from warmslip.scene.structure import structure
 from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
+
+NEAR = 0.5  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with
 
 
 @dataclass(frozen=True)
@@ -112,6 +116,9 @@ class Discretisation:
             )
         x, initial = np.asarray(self.mesh.nodes), scene.initial
 
+        if initial.run is not None:
+            return self.restart(stepper, *self._stored(initial.run, initial.time), 0.0)
+
         def start(name: str, components: int) -> Array:
             value = getattr(initial, name)
             return evaluate(data(value) if value is not None else 0.0, x, 0.0, components, f"initial.{name}")
@@ -123,6 +130,22 @@ class Discretisation:
             start("temperature", 1)[:, 0],
             0.0,
         )
+
+    def _stored(self, run: str, time: float | None) -> tuple[Array, Array, Array]:
+        """The fields of a stored state on this mesh; zero where the other run has none."""
+        found, x = stored_state.read(run, time), np.asarray(self.mesh.nodes)
+        same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, self.mesh.cells)
+        none = {"u": np.zeros_like(x), "w": np.zeros_like(x), "theta": np.zeros(len(x))}
+        out = []
+        for name, zero in none.items():
+            values = getattr(found, name)
+            if values is None:
+                out.append(zero)
+            elif found.nodes.shape[1] != self.dim:
+                raise ValueError(f"initial.from: '{run}' has {found.nodes.shape[1]} dimensions; give one of {self.dim}")
+            else:
+                out.append(values if same else interpolated(values, found.nodes, found.cells, x, NEAR))
+        return out[0], out[1], out[2]
 
     def restart(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
         """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made what is given on the supports.

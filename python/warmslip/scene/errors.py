@@ -83,7 +83,7 @@ def _allowed(where: list[str], root: type[BaseModel]) -> list[str]:
             continue
         model = _table(fields[part].annotation) if part in fields else None
         free = part in fields and get_origin(fields[part].annotation) is dict
-    return sorted(getattr(model, "model_fields", {}))
+    return sorted(one.alias or name for name, one in getattr(model, "model_fields", {}).items())
 
 
 def _table(annotation: Any) -> Any:

@@ -64,7 +64,15 @@ def acts(value: Any) -> bool:
 def _idle(scene: Scene) -> Iterator[str]:
     """A scene in which nothing happens."""
     loads, initial = scene.loads, scene.initial
-    forces = [loads.body, loads.traction, loads.heat_flux, initial.displacement, initial.velocity, scene.supports.moved]
+    forces = [
+        loads.body,
+        loads.traction,
+        loads.heat_flux,
+        initial.displacement,
+        initial.velocity,
+        initial.run,
+        scene.supports.moved,
+    ]
     gaps = [c.gap for c in scene.contacts if c.stiffness and (not isinstance(c.gap, float | int) or c.gap < 0)]
     belts = [c.velocity for c in scene.contacts]
     if acts(forces) or acts(belts) or gaps or (scene.heat is not None and acts(scene.heat.source)):

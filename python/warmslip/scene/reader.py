@@ -89,6 +89,9 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
     mesh = data.get("mesh")
     if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) and path.exists():
         mesh["file"] = str(path.parent / mesh["file"])  # a mesh lies beside its scene
+    initial = data.get("initial")
+    if isinstance(initial, dict) and isinstance(initial.get("from"), str) and path.exists():
+        initial["from"] = str(path.parent / initial["from"])
     return build(data)
 
 

@@ -9,6 +9,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from warmslip.mesh import files
+from warmslip.scene import stored_state
 from warmslip.scene.errors import validated
 from warmslip.scene.overrides import replace
 from warmslip.scene.tables import SceneTables
@@ -26,9 +27,20 @@ class Scene(SceneTables):
 
     def digest(self) -> str:
         """A hash of the resolved scene and of its mesh file."""
-        data = json.dumps(self.resolved(), sort_keys=True)
+        return self._hash(self.resolved())
+
+    def digest_of_steps(self) -> str:
+        """A hash of all that single steps depend on: the scene but for its end, the number of its steps and its output."""
+        kept = {name: table for name, table in self.resolved().items() if name not in ("title", "output")}
+        kept["time"] = {name: value for name, value in kept["time"].items() if name not in ("end", "steps")}
+        return self._hash(kept | {"step": f"{self.step:.10e}"})
+
+    def _hash(self, tables: dict[str, Any]) -> str:
+        data = json.dumps(tables, sort_keys=True)
         if self.mesh.file is not None:
             data += files.read(self.mesh.file).digest
+        if self.initial.run is not None:
+            data += stored_state.digest(self.initial.run)
         return hashlib.sha256(data.encode()).hexdigest()[:16]
 
     def override(self, **values: Any) -> Self:
@@ -36,7 +48,9 @@ class Scene(SceneTables):
 
         Raises SceneError.
         """
-        data = self.model_dump(mode="json", exclude_none=True, exclude_unset=True)  # what was left open stays so
+        data = self.model_dump(
+            mode="json", exclude_none=True, exclude_unset=True, by_alias=True
+        )  # what was left open stays so
         for key, value in values.items():
             replace(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
         return validated(data, type(self))

@@ -5,9 +5,9 @@ What stands below a field is its meaning in the schema, in editors and in the re
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from warmslip.scene.clock import Clock, graded, uniform
 from warmslip.scene.contact_tables import ContactTable
@@ -49,14 +49,31 @@ class LoadsTable(Table):
 
 
 class InitialTable(Table):
-    """Initial data, set to what the supports are held at there."""
+    """Initial data, set to what the supports are held at there: fields, or a stored state of another run."""
 
+    model_config = ConfigDict(**Table.model_config, populate_by_name=True)
+
+    run: str | None = Field(default=None, alias="from")
+    """Path of a trajectory.h5, relative to the scene file: its state is where this run begins. Meshes may differ; fields that the
+    other run lacks are zero."""
+    time: NonNegative | None = None
+    """With from: time of the stored state; the last one unless given."""
     displacement: Values | None = None
     """Length, a number or a formula of the place an axis; 0 unless given."""
     velocity: Values | None = None
     """A number or a formula of the place an axis; 0 unless given."""
     temperature: Value = 0.0
     """A number or a formula of the place."""
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if self.time is not None and self.run is None:
+            raise ValueError("time: of which run? give from = 'trajectory.h5', or leave the key out")
+        if self.run is not None and (self.displacement or self.velocity or self.temperature):
+            raise ValueError(
+                "from: the state of a run holds all fields; leave displacement, velocity and temperature out"
+            )
+        return self
 
 
 class OutputTable(Table):
@@ -125,4 +142,4 @@ class SceneTables(Table):
 
     def resolved(self) -> dict[str, Any]:
         """The scene as plain data, defaults filled in and absent tables left out."""
-        return self.model_dump(mode="json", exclude_none=True)
+        return self.model_dump(mode="json", exclude_none=True, by_alias=True)

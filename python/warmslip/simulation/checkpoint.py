@@ -20,6 +20,7 @@ from warmslip.simulation.statistics import Statistics
 from warmslip.typing import Array
 
 NAMES = ("checkpoint.npz", "checkpoint.previous.npz")  # newest first
+END = "checkpoint.end.npz"  # of a run that was completed, which may go on to a later end
 STATUSES = (0, 1, 2)  # open, stick, slip
 
 
@@ -40,8 +41,11 @@ class Checkpoint:
     extents: list[float]
     arrays: dict[str, Array]
 
-    def write(self, folder: Path) -> None:
-        """Writes the newest checkpoint of a folder; the newest so far becomes the previous one. Raises OSError."""
+    def write(self, folder: Path, end: bool = False) -> None:
+        """Writes the newest checkpoint of a folder; the newest so far becomes the previous one. Raises OSError.
+
+        `end` is for the last state of a run, which has a file of its own.
+        """
         record = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "arrays"}  # not copied
         record |= {"time": self.time.hex(), "statistics": asdict(self.statistics)}
         newest, previous = (folder / name for name in NAMES)
@@ -51,6 +55,9 @@ class Checkpoint:
         except OSError:
             written.unlink(missing_ok=True)  # the disk may be full
             raise
+        if end:
+            os.replace(written, folder / END)
+            return
         if newest.exists():
             os.replace(newest, previous)
         os.replace(written, newest)
@@ -87,22 +94,26 @@ def _whole(path: Path) -> Checkpoint | None:
         return None
 
 
-def read(folder: Path, start: Checkpoint) -> Checkpoint | None:
+def read(folder: Path, start: Checkpoint, scene: str) -> Checkpoint | None:
     """The newest whole checkpoint in a folder of the run that begins with `start`, None if there is none.
 
-    Raises ValueError when the only whole ones belong to another scene, code or number of ranks.
+    `scene` is the digest of the whole scene. Raises ValueError when the only whole ones belong to another scene, code or number
+    of ranks. The last state of a run that was completed is passed over there, unless its scene is another one.
     """
-    foreign = ""
-    for name in NAMES:
+    foreign, sound = {}, []
+    for name in (*NAMES, END):
         found = _whole(folder / name)
         if found is None or not isinstance(found.owner, dict):
             continue
         if other := [key for key, value in start.owner.items() if found.owner.get(key) != value]:
-            foreign = f"{folder / name} is of another {' and '.join(other)}"
+            foreign[name] = f"{folder / name} is of another {' and '.join(other)}"
         elif _sound(found, start):
-            return found
-    if foreign := foreign or _of_another_scene(folder, start.owner["scene"]):
-        raise ValueError(f"{foreign}; run it as it was, or without --resume from the start")
+            sound.append(found)
+    if sound:
+        return max(sound, key=lambda one: one.step)
+    ended, another = foreign.pop(END, ""), _of_another_scene(folder, scene)
+    if reason := next(iter(foreign.values()), "") or (another and (ended or another)):
+        raise ValueError(f"{reason}; run it as it was, or without --resume from the start")
     return None
 
 

@@ -73,10 +73,11 @@ def run(
     observers: Sequence[Observer] = (),
     progress: Callable[[int, int, Any], None] | None = None,
     resume: bool = False,
+    raises: bool = False,
 ) -> Result:
     """Runs a scene to its end, with its own mesh and steps; parameters, result and errors are those of the public `warmslip.run`.
 
-    Collective over `comm`.
+    With `raises`, Ctrl-C raises KeyboardInterrupt once the files are written. Collective over `comm`.
     """
     refuse_types(scene, loads, laws)  # before anything in the folder is removed
     if callable(observers):
@@ -89,16 +90,17 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
+        _refuse_open(folder / "trajectory.h5", comm)
         if not resume:
-            _clear(folder, *checkpoint.NAMES)
+            _clear(folder, *checkpoint.NAMES, checkpoint.END)
     simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)
     rank = simulation.comm.rank
     path = folder / "trajectory.h5" if folder is not None else None
     begin = 0
     if resume and folder is not None:
-        begin = simulation.resume(folder)
-        if not begin and (ended := _ended(simulation, folder)):
+        if ended := _ended(simulation, folder):
             return ended
+        begin = simulation.resume(folder)
         _clear(folder)
     minutes, saved = scene.output.checkpoint_minutes, time.monotonic()
     with (
@@ -109,11 +111,12 @@ def run(
             writer.step(report, simulation.taken)
             asked, late = stop.agreed(simulation.comm, minutes is not None and time.monotonic() - saved > 60 * minutes)
             last = simulation.finished
-            if folder is not None and not last and (asked or late or simulation.taken % scene.output.checkpoint == 0):
+            due = asked or late or simulation.taken % scene.output.checkpoint == 0
+            if folder is not None and (due or last):
                 writer.write()  # no checkpoint is ahead of its trajectory
                 saving = simulation.take_checkpoint()
                 if rank == 0:
-                    saving.write(folder)
+                    saving.write(folder, end=last)
                 saved = time.monotonic()
             for observer in observers:
                 observer(state, report)
@@ -124,9 +127,30 @@ def run(
                 break
     result = finish(simulation, folder)
     if folder is not None and rank == 0 and simulation.outcome != "interrupted":
-        for name in checkpoint.NAMES:  # the run is over, and all of it is on the disk
+        for name in checkpoint.NAMES:  # the run is over; its last state lets it go on to a later end
             (folder / name).unlink(missing_ok=True)
+    if raises and stop.keyboard(simulation.comm):
+        raise KeyboardInterrupt
     return result
+
+
+def _refuse_open(path: Path, comm: Any) -> None:
+    """Raises ValueError for a trajectory that another process writes (collective)."""
+    import fcntl
+
+    from mpi4py import MPI
+
+    comm, taken = MPI.COMM_WORLD if comm is None else comm, False
+    if comm.rank == 0 and path.exists():
+        with path.open("rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # as HDF5 does
+            except BlockingIOError:
+                taken = True
+            except OSError:
+                pass  # a file system without locks
+    if comm.bcast(taken, root=0):
+        raise ValueError(f"{path} is being written by another run; wait for its end, or choose another folder")
 
 
 def _ended(simulation: Simulation, folder: Path) -> Result | None:

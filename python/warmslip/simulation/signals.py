@@ -14,7 +14,7 @@ class Interruption:
     """While it is entered, the first signal is remembered and a second one does what it always did."""
 
     def __init__(self) -> None:
-        self._asked = False
+        self._asked, self._keyboard = False, False
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
@@ -29,12 +29,19 @@ class Interruption:
 
     def _remember(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
+        self._keyboard = number == signal.SIGINT
         self._restore()
 
     def _restore(self) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         self._before = {}
+
+    def keyboard(self, comm: Any) -> bool:
+        """Whether Ctrl-C was pressed on any rank (collective)."""
+        from mpi4py import MPI
+
+        return bool(comm.allreduce(int(self._keyboard), op=MPI.MAX))
 
     def agreed(self, comm: Any, due: bool) -> tuple[bool, bool]:
         """Whether any rank was asked to stop, and whether rank 0 finds a checkpoint `due` (collective)."""

@@ -116,8 +116,16 @@ class Simulation:
     def steps(self) -> Iterator[tuple[State, Any]]:
         """Advances to the end, yielding the state and the report of every step (`_core.StepReport`, with its `balances`).
 
-        Ends before a step that is rejected, whose state is not kept: see `outcome` and `failure`. Collective.
+        Ends before a step that is rejected, whose state is not kept: see `outcome` and `failure`. After
+        `discretisation.restart`, steps begin at the time of that state. Collective.
+
+        Raises
+        ------
+        ValueError
+            When no step of the scene begins at the time of a state that was set.
         """
+        if self.taken == 0 and self.stepper.time != 0:  # the state was set by hand
+            self.pace.start_at(self.stepper.time)
         while (step := self.pace.next()) is not None:
             if (loads := self._data(step)) is None:
                 return
@@ -211,7 +219,7 @@ class Simulation:
             progress |= numbers
             arrays |= changes
         owner = {
-            "scene": self.scene.digest(),
+            "scene": self.scene.digest_of_steps(),
             "code": _fingerprint(),
             "solver": stepper.solver,
             "ranks": self.comm.size,
@@ -242,13 +250,14 @@ class Simulation:
     def resume(self, folder: Path) -> int:
         """Goes on from the newest whole checkpoint in `folder`; the step it goes on from, 0 if there is none (collective).
 
-        Raises ValueError when the only whole checkpoints belong to another scene, code or number of ranks. Python functions
-        in the place of data and laws must be those of the run that was stopped: only their names are compared.
+        The end of the run and its output may differ from those of the run before. Raises ValueError when the only whole
+        checkpoints belong to another scene, code or number of ranks. Python functions in the place of data and laws must be those
+        of the run that was stopped: only their names are compared.
         """
         start, found, refusal = self.take_checkpoint(), None, ""
         if self.comm.rank == 0:
             try:
-                found = checkpoint.read(folder, start)
+                found = checkpoint.read(folder, start, self.scene.digest())
             except ValueError as error:
                 refusal = str(error)
         found, refusal = self.comm.bcast((found, refusal), root=0)
@@ -256,4 +265,9 @@ class Simulation:
             raise ValueError(refusal)
         if found is not None:
             self.restore(found)
+            if not self.pace.reached(self.stepper.time):
+                raise ValueError(
+                    f"the run in {folder} is at t = {found.time:.6g} after {found.step} steps, where this scene has no such "
+                    "step; keep end/steps, and an end that is no earlier"
+                )
         return self.taken

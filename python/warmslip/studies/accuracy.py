@@ -96,6 +96,7 @@ def run(
         "observers": observers,
         "progress": progress,
         "resume": resume,
+        "raises": True,
     }
     if error is None:
         return plain.run(scene, **options)

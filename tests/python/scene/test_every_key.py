@@ -106,6 +106,7 @@ SEVERAL = WHOLE | {
     "contact": [CONTACT, {"part": "left", "stiffness": 1.0}],
     "supports": {"displacement": {"top": [0.0, "t"]}, "temperature": {"top": "t"}},
 }
+CONTINUED = FOUNDATIONS | {"contact": [], "initial": {"from": "run/trajectory.h5", "time": 0.5}}
 SCENES = {
     "whole": WHOLE,
     "file": FILE,
@@ -113,11 +114,13 @@ SCENES = {
     "adaptive": ADAPTIVE,
     "several": SEVERAL,
     "foundations": FOUNDATIONS,
+    "continued": CONTINUED,
 }
 NEVER = [True, "no such thing!", {"surprise": 1.0}, [], [[]], [1.0] * 7, math.nan, math.inf, -math.inf, None, 10**400]
 HOLDS: dict[str, list[int]] = {  # which of those a key can hold
     "title": [1],
     "contact": [3],
+    "initial.from": [1],
     "supports.displacement": [3],
     "supports.temperature": [3],
     "supports.points": [3],
@@ -174,7 +177,7 @@ def models(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
 
 def test_the_scenes_here_hold_every_key() -> None:
     given = {key.rsplit(".", 1)[-1] for data in SCENES.values() for key, _ in leaves(data)}
-    assert {name for model in models(Scene) for name in model.model_fields} <= given
+    assert {one.alias or name for model in models(Scene) for name, one in model.model_fields.items()} <= given
     for data in SCENES.values():
         build(data)
 

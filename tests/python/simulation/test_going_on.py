@@ -1,0 +1,185 @@
+"""Runs that go on: to a later end, from a state of another run, from a state set by hand; results that travel."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from support.processes import child_environment
+
+import warmslip
+from warmslip.simulation.simulation import Simulation
+
+
+def scene(end: float = 0.5, steps: int = 8, **keys: Any) -> warmslip.Scene:
+    small = {"mesh.n": 6, "time.end": end, "time.steps": steps, "output.checkpoint": 3}
+    return warmslip.load("paper_mixed").override(**{**small, **keys})
+
+
+@pytest.mark.parametrize(
+    "keys", [{}, {"time.tolerance": 3e-2}, {"output.every": 5}, {"supports.displacement": [], "loads.traction": {}}]
+)
+def test_a_later_end(tmp_path: Path, keys: dict[str, Any]) -> None:
+    """A run of twice the length, at once and in two pieces with another cadence of output: the same to the last bit."""
+    whole = warmslip.run(scene(1.0, 16, **keys), out=tmp_path / "whole")
+    warmslip.run(scene(0.5, 8, **keys), out=tmp_path / "pieces")
+    taken: list[int] = []
+    longer = scene(1.0, 16, **keys | {"output.every": 2})
+    end = warmslip.run(longer, out=tmp_path / "pieces", resume=True, progress=lambda step, *_: taken.append(step))
+    assert end.completed
+    assert taken[0] > 8 if "time.tolerance" in keys else taken[0] == 9
+    for name in ("u", "w", "theta"):
+        assert np.array_equal(getattr(whole, name), getattr(end, name)), name
+    with warmslip.Trajectory(tmp_path / "whole" / "trajectory.h5") as one, warmslip.Trajectory(end.trajectory) as other:
+        for group in ("steps", "balances"):
+            for name, values in one.series(group).items():
+                assert np.array_equal(values, other.series(group)[name]), name
+        assert other.time[-1] == 1.0
+        assert np.all(np.diff(other.time) > 0)
+
+
+def test_an_end_that_is_past_is_refused(tmp_path: Path) -> None:
+    warmslip.run(scene(0.5, 8), out=tmp_path)
+    with pytest.raises(ValueError, match=r"is at t = 0.5 after 8 steps, where this scene has no such step"):
+        warmslip.run(scene(0.25, 4), out=tmp_path, resume=True)
+    with pytest.raises(ValueError, match="is of another scene"):
+        warmslip.run(scene(1.0, 8), out=tmp_path, resume=True)  # steps of another size
+    assert warmslip.run(scene(0.5, 8), out=tmp_path, resume=True).completed
+
+
+def test_a_state_of_another_run(tmp_path: Path) -> None:
+    """The initial fields are those of the stored state: to the last bit on the same mesh, interpolated on another one."""
+    first = warmslip.run(scene(), out=tmp_path / "one")
+    begin = {"initial": {"from": str(first.trajectory)}}
+    for n, nearness in ((6, 0.0), (12, 1e-14)):
+        started = Simulation(scene(**begin, **{"mesh.n": n}))
+        d = started.discretisation
+        grid = np.arange(0, n + 1, n // 6)
+        index = (grid[:, None] * (n + 1) + grid[None, :]).ravel()
+        for name in ("u", "theta"):
+            values = np.asarray(d.field(getattr(started.stepper, name)))[index]
+            assert np.abs(values - getattr(first, name)).max() <= nearness, name
+    early = Simulation(scene(initial={"from": str(first.trajectory), "time": 0.25}))
+    with warmslip.Trajectory(first.trajectory) as stored:
+        assert np.array_equal(early.discretisation.field(early.stepper.u), stored.u[4])
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        ({"from": "nowhere.h5"}, "initial.from: 'nowhere.h5' is no file"),
+        ({"time": 0.5}, "of which run"),
+        ({"from": "a.h5", "temperature": 2.0}, "holds all fields"),
+    ],
+)
+def test_states_that_are_not_there(initial: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Simulation(scene(initial=initial))
+
+
+def test_a_time_that_is_not_stored(tmp_path: Path) -> None:
+    first = warmslip.run(scene(), out=tmp_path)
+    with pytest.raises(ValueError, match=r"holds no state at t = 0.3; the nearest is at 0.3125"):
+        Simulation(scene(initial={"from": str(first.trajectory), "time": 0.3}))
+
+
+def test_the_file_counts_in_the_digest(tmp_path: Path) -> None:
+    """A scene that begins with another run's state is another scene when that run was another one."""
+    path = tmp_path / "trajectory.h5"
+    digests = []
+    for content in (b"one", b"two"):
+        path.write_bytes(content)
+        os.utime(path, ns=(1, len(digests)))
+        digests.append(scene(initial={"from": str(path)}).digest())
+    assert digests[0] != digests[1]
+
+
+def test_steps_begin_at_the_time_of_a_state_that_was_set() -> None:
+    """After `restart` the loads are those of the time of the state."""
+    moving = scene(2.0, 20, **{"loads.body": [0.0, "-1 - t"]})
+    whole = Simulation(moving)
+    states = [(state.u, state.w, state.theta) for state, _ in whole.steps()]
+    again = Simulation(moving)
+    again.discretisation.restart(again.stepper, *states[9], 1.0)
+    ends = [state.time for state, _ in again.steps()]
+    assert ends[0] == pytest.approx(1.1)
+    assert ends[-1] == 2.0
+    assert len(ends) == 10
+    assert np.abs(again.discretisation.field(again.stepper.u) - states[-1][0]).max() <= 1e-12
+    between = Simulation(moving)
+    between.discretisation.restart(between.stepper, *states[9], 1.05)
+    with pytest.raises(ValueError, match=r"at t = 1.05, where no step of the scene ends"):
+        next(between.steps())
+
+
+def test_results_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trajectory is read, and its scene assembled, in another folder and without the mesh file."""
+    from warmslip.mesh import files
+
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    away.mkdir()
+    mesh = home / "body.msh"
+    shutil.copy(files.find("plate_with_hole.msh"), mesh)
+    monkeypatch.chdir(home)
+    one = warmslip.load("plate_with_hole").override(**{"mesh.file": "body.msh", "time.steps": 2})
+    result = warmslip.run(one, out="run")
+    shutil.copy("run/trajectory.h5", away)
+    mesh.unlink()
+    monkeypatch.chdir(away)
+    with warmslip.Trajectory("trajectory.h5") as stored:
+        d = stored.discretisation()
+        assert np.array_equal(d.mesh.nodes, stored.nodes)
+        last = (None if one is None else one[-1] for one in (stored.u, stored.w, stored.theta))
+        assert np.abs(d.mises_of(*last)).max() > 0
+    assert result.completed
+
+
+def test_two_runs_in_one_folder(tmp_path: Path) -> None:
+    """The second says so and leaves the files of the first as they are."""
+    warmslip.run(scene(), out=tmp_path)
+    before = (tmp_path / "summary.json").read_bytes()
+    holder = h5py.File(tmp_path / "trajectory.h5", "r+")
+    try:
+        with pytest.raises(ValueError, match=r"trajectory.h5 is being written by another run"):
+            warmslip.run(scene(), out=tmp_path)
+    finally:
+        holder.close()
+    assert (tmp_path / "summary.json").read_bytes() == before
+    assert warmslip.run(scene(), out=tmp_path).completed
+
+
+LOOP = """
+import os, signal, sys, warmslip
+scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 8})
+def press(step, steps, report):
+    if step == 3:
+        os.kill(os.getpid(), signal.SIGINT)
+runs = 0
+for mu in (0.1, 0.2, 0.3):
+    runs += 1
+    print(runs, flush=True)
+    warmslip.run(scene, out=sys.argv[1], progress=press)
+"""
+
+
+def test_ctrl_c_ends_a_loop_in_python(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOOP, str(tmp_path)],
+        env=child_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == ["1"]
+    assert done.returncode in (-signal.SIGINT, 130)
+    assert "KeyboardInterrupt" in done.stderr
+    assert (tmp_path / "checkpoint.npz").exists()
