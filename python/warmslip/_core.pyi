@@ -9,7 +9,7 @@ import numpy.typing
 import petsc4py.PETSc
 import scipy.sparse
 import typing
-__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Balances', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
+__all__: list[str] = ['Backend', 'ContactOptions', 'ContactSurface2', 'ContactSurface3', 'Cost', 'Coupling', 'Diagonal', 'Errors', 'Factor', 'Layout2', 'Layout3', 'Balances', 'LoadQuadrature2', 'LoadQuadrature3', 'Material2', 'Material3', 'Mesh2', 'Mesh3', 'Norms2', 'Norms3', 'Operators2', 'Operators3', 'Outcome', 'PartSprings2', 'PartSprings3', 'Problem2', 'Problem3', 'Stage', 'StepReport2', 'StepReport3', 'Stepper2', 'Stepper3', 'Symmetry', 'compiler', 'heat_matrix', 'largest_strain', 'momentum_matrix', 'petsc_version', 'prolongation', 'simplex_rule', 'stress', 'stress_out_of_plane']
 class Diagonal:
     """
     Members:

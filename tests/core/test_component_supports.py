@@ -104,6 +104,31 @@ def mirrored(d: int, mesh: Any) -> Any:
 
 
 @check
+def the_operator_with_inclined_supports_is_symmetric(d: int) -> None:
+    """Rows and columns of the held directions are those of a multiple of the projector."""
+    skew = np.ones(d) / np.sqrt(d)
+    turn = np.eye(d) - 2 * np.outer(skew, skew)  # a reflection
+    turn[:, 0] *= -1
+    one = pressed(d, guides(d), n=2, loads={"body": along(d, -1.0)}, viscosity={"lame": [0.2, 0.3]})
+    other, mesh = turned(one, turn)
+    d_ = discretise(other, mesh=mesh)
+    matrix = _core.momentum_matrix(d_.layout, d_.problem, d_.operators, 0.1)
+    supports = d_.load_vectors.supports
+    held = np.zeros((len(d_.mesh.nodes), d))
+    held[supports.nodes] = supports.projectors @ np.arange(1.0, d + 1)
+    given, out, back = (d_.distributed(held), d_.distributed(held), d_.distributed(held))
+    matrix.mult(given, out)
+    matrix.multTranspose(given, back)
+    size = matrix.norm()
+    assert (out - back).norm() <= 1e-15 * size
+    rows = d_.field(out)
+    assert np.abs(np.delete(rows, supports.nodes, axis=0)).max() <= 1e-15 * size
+    left = rows[supports.nodes] - np.einsum("nab,nb->na", supports.projectors, rows[supports.nodes])
+    assert np.abs(left).max() <= 1e-15 * size
+    assert np.abs(rows[supports.nodes]).sum(axis=1).min() > 1e-3 * size / len(rows)
+
+
+@check
 def a_part_of_a_body_on_symmetry_planes_is_the_whole_body(d: int) -> None:
     """Half a block in the plane and a quarter in space on a rounded foundation, with friction."""
     top = {"top": ["free"] * (d - 1) + ["-0.05 * t"]}

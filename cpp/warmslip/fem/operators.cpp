@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "warmslip/fem/supports.hpp"
 #include "warmslip/physics/p1.hpp"
 
 namespace warmslip {
@@ -90,13 +91,6 @@ void add_exchange(const Layout<d>& layout, const Problem<d>& problem, double fac
   }
 }
 
-// Whether this rank owns a node.
-template <int d>
-bool owns(const Layout<d>& layout, Index node) {
-  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0, global = layout.global_of(node);
-  return global >= first && global < first + layout.owned();
-}
-
 // Owned global nodes of `parts`.
 template <int d>
 std::vector<PetscInt> owned_nodes(const Layout<d>& layout, const std::vector<std::string>& parts) {
@@ -109,93 +103,6 @@ std::vector<PetscInt> owned_nodes(const Layout<d>& layout, const std::vector<std
   for (const Index node : nodes)
     if (owns(layout, node)) indices.push_back(layout.global_of(node));
   return indices;
-}
-
-// Parts the held directions of the nodes into components, owned scalar indices, and those that lie askew to the axes.
-template <int d>
-void hold(const Layout<d>& layout, const Problem<d>& problem, Operators<d>& operators) {
-  for (const auto& [node, held] : held_directions(problem)) {
-    Tensor2<d> askew = held;
-    for (int a = 0; a < d; ++a) {
-      if (held(a, a) != 1) continue;
-      if (owns(layout, node)) operators.prescribed_displacement.push_back(layout.global_of(node) * d + a);
-      askew.row(a).setZero();
-      askew.col(a).setZero();
-    }
-    if (!askew.isZero(0)) operators.inclined.push_back({node, askew});
-  }
-}
-
-// The momentum's block of a cell, `width` unknowns a node, without the held directions of inclined nodes.
-template <int d, class Block>
-void release(const Layout<d>& layout, const std::map<Index, Tensor2<d>>& inclined, Index cell, int width,
-             Block& block) {
-  for (int i = 0; i <= d; ++i) {
-    const auto found = inclined.find(layout.mesh().cells(cell, i));
-    if (found == inclined.end()) continue;
-    const Tensor2<d> free = Tensor2<d>::Identity() - found->second;
-    block.template middleRows<d>(i * width) = (free * block.template middleRows<d>(i * width)).eval();
-    block.template middleCols<d>(i * width) = (block.template middleCols<d>(i * width) * free).eval();
-  }
-}
-
-template <int d>
-std::map<Index, Tensor2<d>> by_node(const std::vector<HeldNode<d>>& nodes) {
-  std::map<Index, Tensor2<d>> out;
-  for (const HeldNode<d>& one : nodes) out[one.node] = one.held;
-  return out;
-}
-
-// Adds factor * int v . S w over the facets on springs, or on dashpots, to a matrix with `width` unknowns a node.
-template <int d>
-void add_springs(const Layout<d>& layout, const Problem<d>& problem, double stiffness, double damping,
-                 const std::map<Index, Tensor2<d>>& inclined, int width, Mat a) {
-  for (const PartSprings<d>& springs : problem.springs) {
-    const Facets<d>& facets = layout.mesh().part(springs.part);
-    for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
-      if (!layout.owns_cell(facets.cells[static_cast<std::size_t>(f)])) continue;
-      const Point<d> area = area_normal(layout.mesh(), facets, f), nu = area.normalized();
-      const Tensor2<d> tensor = stiffness * springs.stiffness.on(nu) + damping * springs.damping.on(nu);
-      const Eigen::Matrix<double, d, d> mass = warmslip::mass<d>(area.norm());
-      RowMajor<d * d, d * d> values;
-      std::array<PetscInt, static_cast<std::size_t>(d * d)> unknowns;
-      std::array<Tensor2<d>, static_cast<std::size_t>(d)> free;
-      for (int i = 0; i < d; ++i) {
-        const auto found = inclined.find(facets.nodes(f, i));
-        free[static_cast<std::size_t>(i)] = Tensor2<d>::Identity();
-        if (found != inclined.end()) free[static_cast<std::size_t>(i)] -= found->second;
-        for (int c = 0; c < d; ++c)
-          unknowns[static_cast<std::size_t>(i * d + c)] = layout.global_of(facets.nodes(f, i)) * width + c;
-      }
-      for (int i = 0; i < d; ++i)
-        for (int j = 0; j < d; ++j)
-          values.template block<d, d>(i * d, j * d) =
-              mass(i, j) * free[static_cast<std::size_t>(i)] * tensor * free[static_cast<std::size_t>(j)];
-      WARMSLIP_PETSC(MatSetValues(a, d * d, unknowns.data(), d * d, unknowns.data(), values.data(), ADD_VALUES));
-    }
-  }
-}
-
-// Adds s P at the inclined nodes; s is the largest diagonal entry of the node.
-template <int d>
-void add_held(const Layout<d>& layout, const std::vector<HeldNode<d>>& inclined, int width, Mat a) {
-  if (inclined.empty()) return;
-  VecHandle diagonal;
-  WARMSLIP_PETSC(MatCreateVecs(a, diagonal.out(), nullptr));
-  WARMSLIP_PETSC(MatGetDiagonal(a, diagonal));
-  {
-    Values entries(diagonal);
-    for (const HeldNode<d>& one : inclined) {
-      if (!owns(layout, one.node)) continue;
-      const PetscInt first = (layout.global_of(one.node) - layout.global_nodes()[0]) * width;
-      const double scale = (*entries).template segment<d>(first).maxCoeff();
-      for (int i = 0; i < d; ++i)
-        for (int j = 0; j < d; ++j)
-          WARMSLIP_PETSC(MatSetValue(a, layout.global_of(one.node) * width + i, layout.global_of(one.node) * width + j,
-                                     scale * one.held(i, j), ADD_VALUES));
-    }
-  }
-  layout.assemble(a);
 }
 
 void fix(Mat a, const std::vector<PetscInt>& indices) {
@@ -233,7 +140,7 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
   };
   if (on_springs) add_to(elasticity, springs, 1, 0);
   if (on_dashpots) add_to(viscosity, dashpots, 0, 1);
-  if (problem.moves()) hold(layout, problem, *this);
+  if (problem.moves()) std::tie(prescribed_displacement, inclined) = held_unknowns(layout, problem);
   if (!problem.conducts()) return;
   mass = assemble(layout, problem, 1, 1,
                   [&](const S& s, const M& m) { return (m.capacity * heat_mass<d + 1>(problem, s.volume)).eval(); });
@@ -269,21 +176,6 @@ MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, co
   add_held(layout, operators.inclined, d, a);
   fix(a, operators.prescribed_displacement);
   return a;
-}
-
-template <int d>
-Eigen::VectorXd support_scales(const Layout<d>& layout, const Operators<d>& operators, Mat a, int width) {
-  Eigen::VectorXd scales = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(operators.inclined.size()));
-  for (Eigen::Index i = 0; i < scales.size(); ++i) {
-    const HeldNode<d>& one = operators.inclined[static_cast<std::size_t>(i)];
-    if (!owns(layout, one.node)) continue;
-    std::array<PetscInt, d> unknowns;
-    for (int c = 0; c < d; ++c) unknowns[static_cast<std::size_t>(c)] = layout.global_of(one.node) * width + c;
-    RowMajor<d, d> block;
-    WARMSLIP_PETSC(MatGetValues(a, d, unknowns.data(), d, unknowns.data(), block.data()));
-    scales[i] = (one.held * block).trace() / one.held.trace();
-  }
-  return scales.size() ? layout.sum(std::move(scales)) : scales;
 }
 
 template <int d>
@@ -355,7 +247,6 @@ std::pair<double, Symmetry> coupled_symmetry(const Problem<d>& problem) {
 #define WARMSLIP_INSTANTIATE(d)                                                                                   \
   template struct Operators<d>;                                                                                   \
   template MatHandle momentum_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double);        \
-  template Eigen::VectorXd support_scales<d>(const Layout<d>&, const Operators<d>&, Mat, int);                    \
   template MatHandle heat_matrix<d>(const Operators<d>&, double);                                                 \
   template MatHandle coupled_matrix<d>(const Layout<d>&, const Problem<d>&, const Operators<d>&, double, double); \
   template std::pair<double, Symmetry> coupled_symmetry<d>(const Problem<d>&);

@@ -40,10 +40,6 @@ struct Operators {
 template <int d>
 MatHandle momentum_matrix(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators, double k);
 
-/// The factors s of the inclined nodes in a matrix with `width` unknowns a node (collective).
-template <int d>
-Eigen::VectorXd support_scales(const Layout<d>& layout, const Operators<d>& operators, Mat a, int width);
-
 /// M / k + D + J with the rows and columns of prescribed temperatures replaced by the identity.
 template <int d>
 MatHandle heat_matrix(const Operators<d>& operators, double k);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "warmslip/fem/supports.hpp"
+
 namespace warmslip {
 namespace {
 
@@ -127,7 +129,7 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
         "nothing holds the body: its supports leave it, or a part of it, a rigid motion, and it has no inertia and no "
         "contact; hold one more place or component, or give inertia.density > 0");
   if (!rigid.empty()) rigid.add_springs(a);
-  support_scales = warmslip::support_scales(layout, operators, a, width);
+  support_scales = warmslip::support_scales(layout, operators.inclined, a, width);
   momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
   if (rigid.empty()) return;
   rigid.prepare(*momentum, [&](Vec x, Vec y) {

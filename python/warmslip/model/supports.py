@@ -216,8 +216,8 @@ class Supports:
         given = np.concatenate(self._values(t, evaluate))[order]
         scale = np.abs(given).max()
         for at, forms, inverse in self._groups:
-            out[at] = np.einsum("nam,nm->na", inverse, given[forms])
-            left = np.abs(np.einsum("nma,na->nm", directions[forms], out[at]) - given[forms]).max(axis=1)
+            out[at] = np.einsum("naf,nf->na", inverse, given[forms])
+            left = np.abs(np.einsum("nfa,na->nf", directions[forms], out[at]) - given[forms]).max(axis=1)
             if scale > 0 and (left > AGREE * scale).any():
                 raise ValueError(self._conflict(int(at[left.argmax()]), where, number, given, t))
         return out

@@ -33,7 +33,10 @@ PINNED = {
     "plate_with_hole": ("theta_L2", 2.363267372),
     "block_with_hole": ("u_V", 0.088526593),
     "creep_column": ("u_L2", 0.3169927902),
-    "hertz": ("u_V", 0.1942569468),
+    "hertz": ("u_V", 0.1941622024),
+    "belt": ("w_L2", 0.2826249710),
+    "drum": ("theta_L2", 1.664430192),
+    "quarter_sphere": ("u_V", 0.01781753075),
     "wavy_road": ("w_L2", 0.00477215511),
 }
 LARGE = {"paper_printed", "paper_mixed", "paper_isotropic", "paper_consistent", "block_3d"}  # the studies run them
@@ -242,8 +245,71 @@ def test_the_cylinder_presses_as_hertz_says() -> None:
         np.asarray(simulation.discretisation.surface.weights),
     )
     width = 2 * np.sqrt((weights * pressure) @ x**2 / force)
-    assert pressure.max() == pytest.approx(peak, rel=1e-2)
+    assert pressure.max() == pytest.approx(peak, rel=1.5e-2)  # a parabola has 1.0 %, the circle is steeper at its edge
     assert width == pytest.approx(2 * force / (np.pi * peak), rel=1e-2)
+
+
+def test_half_the_cylinder_is_the_whole_one() -> None:
+    """Half of Hertz's block on a symmetry plane, with friction: the whole block to 1e-12."""
+    whole = warmslip.load("hertz").override(**{"mesh.n": [48, 24], "contact.friction": {"coefficient": 0.3}})
+    half = whole.override(
+        **{
+            "mesh.n": [24, 24],
+            "mesh.lengths": [6.0, 6.0],
+            "contact.gap.at": [0.0, -4.0],
+            "supports.displacement": {"top": [0.0, "-0.25 * t"], "left": [0.0, "free"]},
+        }
+    )
+    ends = []
+    for scene, shift in ((whole, 6.0), (half, 0.0)):
+        simulation = warmslip.Simulation(scene)
+        for _, report in simulation.steps():
+            force = report.normal_force
+        x = np.asarray(simulation.discretisation.mesh.nodes) - [shift, 0.0]
+        u = np.asarray(simulation.discretisation.field(simulation.stepper.u))
+        right = x[:, 0] >= -1e-12
+        order = np.lexsort(np.round(x[right].T, 9))
+        ends.append((u[right][order], force))
+    assert ends[1][1] == pytest.approx(ends[0][1] / 2, rel=1e-12)
+    assert np.abs(ends[0][0] - ends[1][0]).max() <= 1e-12 * np.abs(ends[0][0]).max()
+
+
+def test_the_quarter_sphere_presses_as_hertz_says() -> None:
+    simulation = warmslip.Simulation(warmslip.load("quarter_sphere"))
+    for state, report in simulation.steps():
+        pressure, force = state.contact["pressure"], 4 * report.normal_force
+    modulus, radius = 1 / (1 - 0.3**2), 2.0
+    peak = (6 * force * modulus**2 / (np.pi**3 * radius**2)) ** (1 / 3)
+    assert pressure.max() == pytest.approx(peak, rel=2e-2)
+    x, weights = (
+        np.asarray(simulation.discretisation.surface.positions),
+        np.asarray(simulation.discretisation.surface.weights),
+    )
+    contact_radius = np.sqrt(2.5 * 4 * (weights * pressure) @ (x[:, :2] ** 2).sum(axis=1) / force)
+    assert contact_radius == pytest.approx((3 * force * radius / (4 * modulus)) ** (1 / 3), rel=4e-2)
+
+
+def test_the_belt_takes_the_block_along() -> None:
+    """The block gains mu g while it slips, and moves with the belt when it sticks."""
+    simulation = warmslip.Simulation(warmslip.load("belt"))
+    speeds = []
+    for state, report in simulation.steps():
+        speeds.append((state.time, float(state.w[:, 0].mean()), report.stick))
+    slipping = [(t, speed) for t, speed, stick in speeds if 0.2 < t < 0.6]
+    assert max(abs(speed - 0.6 * t) for t, speed in slipping) < 1e-3
+    assert speeds[-1][2] > 15
+    assert speeds[-1][1] == pytest.approx(0.4, rel=2e-2)
+
+
+def test_the_drum_drags_the_shoe_with_its_friction() -> None:
+    simulation = warmslip.Simulation(warmslip.load("drum"))
+    for _, report in simulation.steps():
+        last = report
+    assert last.open > 0 and last.stick == 0
+    assert last.friction_traction[0] == pytest.approx(-0.3 * last.normal_force, rel=1e-12)
+    reactions = simulation.discretisation.field(simulation.stepper.reactions)
+    assert reactions.sum(axis=0) == pytest.approx([0.3 * last.normal_force, -last.normal_force], rel=1e-10)
+    assert last.balances.foundation_work == pytest.approx(last.balances.friction, rel=1e-10)
 
 
 def test_the_waves_shake_the_body_and_do_not_drag_it() -> None:
