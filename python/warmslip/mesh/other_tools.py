@@ -1,0 +1,150 @@
+"""Meshes of other tools through meshio: VTU, Abaqus and CalculiX, MED, Exodus, Nastran."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warmslip.mesh.elements import SHAPES
+from warmslip.mesh.raw import Block, Raw
+
+FORMATS = {".vtu": "vtu", ".inp": "abaqus", ".med": "med", ".exo": "exodus", ".e": "exodus", ".bdf": "nastran"}
+NAMES = {
+    "vertex": "point",
+    "line": "line",
+    "triangle": "triangle",
+    "quad": "quadrangle",
+    "tetra": "tetrahedron",
+    "hexahedron": "hexahedron",
+    "wedge": "prism",
+    "pyramid": "pyramid",
+}
+REFERENCES = ("gmsh:physical", "medit:ref", "nastran:ref")  # cell data that number groups
+
+
+def parse(path: Path) -> Raw:
+    """A mesh with the cell sets of the file as its groups.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose suffix is in FORMATS.
+
+    Returns
+    -------
+    Raw
+        Cell sets are those of Abaqus, the families of MED, the blocks of Exodus, or the values of an integer array of the cells.
+
+    Raises
+    ------
+    ValueError
+        For a file that meshio cannot read, or reads wrongly. Unlike the reader of gmsh files, meshio believes what a file says
+        of its sizes.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".inp":
+        _check_abaqus(path.read_text(errors="replace"))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mesh = importlib.import_module(f"meshio.{FORMATS[suffix]}").read(str(path))
+    except ModuleNotFoundError as error:
+        raise ValueError(f"meshio needs the package {error.name} to read it; install it with pip") from None
+    except Exception as error:  # meshio raises whatever a broken file leads to
+        reason = " ".join(str(error).split())[:100] or type(error).__name__
+        raise ValueError(f"meshio cannot read it ({reason}); export the mesh again, or as MSH 4.1") from None
+    return _raw(mesh, _sets(mesh, suffix))
+
+
+def _raw(mesh: Any, found: tuple[dict[str, list[Any]], list[str]]) -> Raw:
+    points, (sets, remarks) = np.asarray(mesh.points, float), found
+    raw = Raw(np.zeros((len(points), 3)), np.arange(1, len(points) + 1), remarks=remarks)
+    raw.nodes[:, : points.shape[1]] = points
+    names: dict[tuple[int, int, str], None] = {}
+    for i, cells in enumerate(mesh.cells):
+        shape = NAMES.get(re.sub(r"\d+$", "", cells.type))
+        nodes = np.asarray(cells.data, np.int64)
+        if shape is None:
+            raise ValueError(
+                f"it holds cells of the type {cells.type}; mesh with triangles, tetrahedra, or what divides into them"
+            )
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
+            raise ValueError("a cell names a node that the file does not hold; export the mesh again")
+        inside = [np.unique(np.asarray(members[i], np.int64)) for members in sets.values()]
+        names |= {(SHAPES[shape][0], k, name): None for k, name in enumerate(sets, 1) if len(inside[k - 1])}
+        group = np.repeat(np.arange(1, len(sets) + 1), [len(members) for members in inside])
+        raw.blocks.append(Block(shape, nodes, np.concatenate([np.empty(0, np.int64), *inside]), group))
+    raw.names = list(names)
+    if empty := sorted(set(sets).difference(name for *_, name in names)):
+        raise ValueError(f"its cell set '{empty[0]}' is empty; remove it, or give it cells")
+    return raw
+
+
+def _sets(mesh: Any, suffix: str) -> tuple[dict[str, list[Any]], list[str]]:
+    """Cells of each set in every block of cells, and remarks."""
+    if mesh.cell_sets:
+        short = [name for name, members in mesh.cell_sets.items() if len(members) != len(mesh.cells)]
+        if short:
+            raise ValueError(
+                f"its cell set '{short[0]}' stands before some of the cells; write the sets after all cells"
+            )
+        return mesh.cell_sets, []
+    if FORMATS[suffix] == "exodus":
+        several = range(len(mesh.cells))
+        return {
+            str(k + 1): [np.arange(len(block.data) if k == i else 0) for i, block in enumerate(mesh.cells)]
+            for k in several
+        }, []
+    data = {
+        name: [np.asarray(values) for values in blocks]
+        for name, blocks in mesh.cell_data.items()
+        if all(np.asarray(values).ndim == 1 and np.asarray(values).dtype.kind in "iu" for values in blocks)
+    }
+    if families := getattr(mesh, "cell_tags", None):
+        return _families(families, data["cell_tags"]), []
+    chosen = [name for name in REFERENCES if name in data] or list(data)
+    if len(chosen) > 1:
+        return {}, [
+            f"its cells have several integer arrays ({', '.join(chosen)}), and none is taken for parts and regions"
+        ]
+    return (_by_value(chosen[0], data[chosen[0]]) if chosen else {}), []
+
+
+def _families(families: dict[int, list[str]], tags: list[Any]) -> dict[str, list[Any]]:
+    """Groups of MED: a cell is in one family, a family in several groups."""
+    numbers: dict[str, list[int]] = {}
+    for number, names in families.items():
+        for name in names:
+            numbers.setdefault(name, []).append(number)
+    return {name: [np.flatnonzero(np.isin(values, of)) for values in tags] for name, of in numbers.items()}
+
+
+def _by_value(name: str, blocks: list[Any]) -> dict[str, list[Any]]:
+    """Cells by the value of an array. meshio writes sets as an array called after all of them, with their positions."""
+    values = np.unique(np.concatenate(blocks)).tolist()
+    names = name.split("-")
+    if len(names) < 2 or not set(values) <= {-1, *range(len(names))}:
+        names = []
+    return {
+        names[value] if names else str(value): [np.flatnonzero(block == value) for block in blocks]
+        for value in values
+        if not names or value >= 0
+    }
+
+
+def _check_abaqus(text: str) -> None:
+    """Raises ValueError for sets that meshio assigns to other elements, or loses."""
+    lines = [
+        line.upper().replace(" ", "") for line in re.findall(r"^\*ELEMENT\b.*", text, re.MULTILINE | re.IGNORECASE)
+    ]
+    sets = [found[1] for line in lines if (found := re.search(r",ELSET=([^,]+)", line))]
+    more = re.findall(r"^\*ELSET\s*,.*?ELSET\s*=\s*([^,\s]+)", text, re.MULTILINE | re.IGNORECASE)
+    if sets and (len(set(sets)) < len(lines) or {name.upper() for name in more} & set(sets)):
+        raise ValueError(
+            "some *ELEMENT lines share an ELSET or have none; give each line an ELSET of its own, or write *ELSET lines"
+        )
