@@ -112,7 +112,7 @@ def _divided(raw: Raw, dim: int) -> Iterator[str]:
     for shape in ("quadrangle", "hexahedron", "prism", "pyramid"):
         if count := sum(len(block.nodes) for block in _cells(raw, dim) if block.shape == shape):
             plural = "hexahedra" if shape == "hexahedron" else f"{shape}s"
-            yield f"{count} {plural} are divided into {'triangles' if dim == 2 else 'tetrahedra'}"
+            yield f"{plural} divided into {'triangles' if dim == 2 else 'tetrahedra'}: {count}"
 
 
 def _loose(raw: Raw, dim: int) -> Iterator[str]:
@@ -120,7 +120,7 @@ def _loose(raw: Raw, dim: int) -> Iterator[str]:
     for block in _cells(raw, dim):
         used[block.nodes] = True
     if count := int((~used).sum()):
-        yield f"{count} {'node' if count == 1 else 'nodes'} without a cell left out, as the centre of an arc"
+        yield f"nodes without a cell, such as centres of arcs, left out: {count}"
 
 
 def _again(count: int, what: str) -> str:

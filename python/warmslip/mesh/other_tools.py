@@ -63,19 +63,14 @@ def parse(path: Path) -> Raw:
 
 def _raw(mesh: Any, found: tuple[dict[str, list[Any]], list[str]]) -> Raw:
     points, (sets, remarks) = np.asarray(mesh.points, float), found
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError("it holds no nodes in the plane or in space; export the mesh again")
     raw = Raw(np.zeros((len(points), 3)), np.arange(1, len(points) + 1), remarks=remarks)
     raw.nodes[:, : points.shape[1]] = points
     names: dict[tuple[int, int, str], None] = {}
     for i, cells in enumerate(mesh.cells):
-        shape = NAMES.get(re.sub(r"\d+$", "", cells.type))
-        nodes = np.asarray(cells.data, np.int64)
-        if shape is None:
-            raise ValueError(
-                f"it holds cells of the type {cells.type}; mesh with triangles, tetrahedra, or what divides into them"
-            )
-        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
-            raise ValueError("a cell names a node that the file does not hold; export the mesh again")
-        inside = [np.unique(np.asarray(members[i], np.int64)) for members in sets.values()]
+        shape, nodes = _elements(cells, len(points))
+        inside = [_members(name, members[i], len(nodes)) for name, members in sets.items()]
         names |= {(SHAPES[shape][0], k, name): None for k, name in enumerate(sets, 1) if len(inside[k - 1])}
         group = np.repeat(np.arange(1, len(sets) + 1), [len(members) for members in inside])
         raw.blocks.append(Block(shape, nodes, np.concatenate([np.empty(0, np.int64), *inside]), group))
@@ -85,33 +80,52 @@ def _raw(mesh: Any, found: tuple[dict[str, list[Any]], list[str]]) -> Raw:
     return raw
 
 
+def _elements(cells: Any, count: int) -> tuple[str, Any]:
+    """Shape and nodes of a block of cells, in a mesh of `count` nodes."""
+    shape = NAMES.get(re.sub(r"\d+$", "", cells.type))
+    if shape is None:
+        raise ValueError(
+            f"it holds cells of the type {cells.type}; mesh with triangles, tetrahedra, or what divides into them"
+        )
+    nodes = np.asarray(cells.data, np.int64)
+    if nodes.size and not (nodes.min() >= 0 and nodes.max() < count and nodes.shape[1] >= SHAPES[shape][1]):
+        raise ValueError("a cell names a node that the file does not hold; export the mesh again")
+    return shape, nodes
+
+
+def _members(name: str, members: Any, count: int) -> Any:
+    """The cells of a set in a block of `count` cells."""
+    if any(np.ndim(one) for one in members):
+        raise ValueError(f"its cell set '{name}' lists other sets; list its cells")
+    found = np.unique(np.asarray(members, np.int64))
+    if len(found) and not 0 <= found[0] <= found[-1] < count:
+        raise ValueError(f"its cell set '{name}' lists a cell that the file does not hold; export the mesh again")
+    return found
+
+
 def _sets(mesh: Any, suffix: str) -> tuple[dict[str, list[Any]], list[str]]:
     """Cells of each set in every block of cells, and remarks."""
     if mesh.cell_sets:
-        short = [name for name, members in mesh.cell_sets.items() if len(members) != len(mesh.cells)]
-        if short:
-            raise ValueError(
-                f"its cell set '{short[0]}' stands before some of the cells; write the sets after all cells"
-            )
+        for name, members in mesh.cell_sets.items():
+            if len(members) != len(mesh.cells):
+                fault = "lists other sets, or stands before some of the cells" if any(map(len, members)) else "is empty"
+                raise ValueError(f"its cell set '{name}' {fault}; list its cells behind all cells")
         return mesh.cell_sets, []
     if FORMATS[suffix] == "exodus":
-        several = range(len(mesh.cells))
-        return {
-            str(k + 1): [np.arange(len(block.data) if k == i else 0) for i, block in enumerate(mesh.cells)]
-            for k in several
-        }, []
+        sizes = [len(block.data) for block in mesh.cells]
+        blocks = range(len(sizes))
+        return {str(k + 1): [np.arange(sizes[i] if i == k else 0) for i in blocks] for k in blocks}, []
     data = {
         name: [np.asarray(values) for values in blocks]
         for name, blocks in mesh.cell_data.items()
         if all(np.asarray(values).ndim == 1 and np.asarray(values).dtype.kind in "iu" for values in blocks)
     }
-    if families := getattr(mesh, "cell_tags", None):
+    if (families := getattr(mesh, "cell_tags", None)) and "cell_tags" in data:
         return _families(families, data["cell_tags"]), []
     chosen = [name for name in REFERENCES if name in data] or list(data)
     if len(chosen) > 1:
-        return {}, [
-            f"its cells have several integer arrays ({', '.join(chosen)}), and none is taken for parts and regions"
-        ]
+        several = f"its cells have several integer arrays ({', '.join(chosen)})"
+        return {}, [f"{several}, and none is taken for parts and regions; keep the one that numbers them"]
     return (_by_value(chosen[0], data[chosen[0]]) if chosen else {}), []
 
 

@@ -24,12 +24,12 @@ from support.gmsh_corpus import CASES, REFUSED
 
 SAID = {  # of remarks and notes; numbers of cells are those of gmsh's version
     "second_order": "cells are of second or higher order; only their corners are used",
-    "quadrangles": "quadrangles are divided into triangles",
-    "hexahedra": "hexahedra are divided into tetrahedra",
-    "prisms": "prisms are divided into tetrahedra",
-    "pyramids": "pyramids are divided into tetrahedra",
+    "quadrangles": "quadrangles divided into triangles",
+    "hexahedra": "hexahedra divided into tetrahedra",
+    "prisms": "prisms divided into tetrahedra",
+    "pyramids": "pyramids divided into tetrahedra",
     "coincident": "facets occur more than once in a group",
-    "curved": "without a cell left out",
+    "curved": "nodes without a cell, such as centres of arcs, left out",
 }
 BOUNDARY = {"curved": 2 + 1.5 + 0.5 + 1 + np.pi / 4, "pyramids": 6.0, 2: 6.0, 3: 10.0}
 

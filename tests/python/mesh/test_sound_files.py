@@ -59,7 +59,7 @@ def test_a_load_on_facets_that_are_there_twice_acts_once() -> None:
 
 def test_a_rounded_corner_is_read_without_the_centre_of_its_arc() -> None:
     mesh = files.read(str(FOLDER / "arc_centre_41.msh"))
-    assert mesh.notes == ("1 node without a cell left out, as the centre of an arc",)
+    assert mesh.notes == ("nodes without a cell, such as centres of arcs, left out: 1",)
     assert len(mesh.nodes) == 67 and len(np.unique(mesh.cells)) == 67
     assert {name: measures.measure(mesh.nodes, part) for name, part in mesh.parts.items()} == pytest.approx(
         {"bottom": 2.0, "top": 2.0}
@@ -135,7 +135,7 @@ def test_explain_prints_every_size() -> None:
 
 def test_sizes_in_space() -> None:
     mesh = files.read(str(FOLDER / "prisms_22_binary.msh"))
-    assert mesh.notes == ("156 prisms are divided into tetrahedra",)
+    assert mesh.notes == ("prisms divided into tetrahedra: 156",)
     assert measures.lines(mesh)[2:] == [
         "part 'bottom': 52 facets, area 2",
         "part 'top': 52 facets, area 2",
