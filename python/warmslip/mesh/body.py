@@ -79,8 +79,15 @@ def _thinnest(nodes: Any, halves: Any) -> Any:
     """The smaller share of the area of a quadrangle that one of its halves has, negative where it lies outside."""
     x = nodes[halves][..., :2]
     with np.errstate(all="ignore"):  # nodes that are nowhere are refused later
-        area = np.linalg.det(x[:, :, 1:] - x[:, :, :1])
+        area = _determinants((x[:, :, 1:] - x[:, :, :1]).reshape(-1, 2, 2)).reshape(-1, 2)
         return np.nan_to_num((area / area.sum(axis=1, keepdims=True)).min(axis=1))
+
+
+def _determinants(a: Any) -> Any:
+    """Of matrices (m, d, d), d = 2 or 3, without the divisions of an elimination."""
+    if a.shape[1] == 2:
+        return a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
+    return np.einsum("ij,ij->i", a[:, 0], np.cross(a[:, 1], a[:, 2]))
 
 
 def oriented(nodes: Any, cells: Any, tags: Any) -> Any:
@@ -89,7 +96,7 @@ def oriented(nodes: Any, cells: Any, tags: Any) -> Any:
     Raises ValueError for a cell without volume.
     """
     edges = nodes[cells[:, 1:]] - nodes[cells[:, :1]]
-    volumes = np.linalg.det(edges)
+    volumes = _determinants(edges)
     size = np.linalg.norm(edges, axis=2).max(axis=1)
     dim = cells.shape[1] - 1
     flat = ~(np.abs(volumes) > FLAT * math.factorial(dim) * size**dim)

@@ -14,6 +14,7 @@ from warmslip.mesh.facets import incidence
 from warmslip.mesh.groups import boundary_parts, lower, named
 from warmslip.mesh.raw import Block, Raw
 
+LARGEST = 1e100  # coordinate whose cube is a number
 PLANE = 1e-10  # spread of z over that of x and y, up to which a body is plane
 
 
@@ -91,6 +92,11 @@ def _check_places(nodes: NDArray[np.float64], dim: int) -> None:
     if not np.isfinite(nodes).all():
         raise ValueError("a node has a coordinate that is not finite; repair the mesh")
     low, high = nodes.min(axis=0), nodes.max(axis=0)
+    reach, size = float(np.abs(nodes).max()), float((high / 2 - low / 2).max())
+    if reach > LARGEST or 0 < size < 1 / LARGEST:
+        raise ValueError(
+            f"its coordinates reach {reach:.3g}, and its size is {2 * size:.3g}; take another unit of length"
+        )
     if dim == 2 and high[2] - low[2] > PLANE * (high - low)[:2].max():
         raise ValueError(
             f"its cells are a surface in space, with z from {low[2]:.3g} to {high[2]:.3g}; mesh the volume (gmsh -3), or turn a "

@@ -33,8 +33,10 @@ def parse(data: bytes) -> Raw:
     """
     head = section(data, b"MeshFormat").split(None, 3)
     version, binary, *_ = [*head, b"", b""]
+    if not re.fullmatch(rb"\d[\d.]*", version):
+        raise ValueError(f"$MeshFormat does not begin with a version; {CUT}")
     if version not in VERSIONS:
-        raise ValueError(f"its format is MSH {version.decode(errors='replace')[:20]}; save it as MSH 4.1 or 2.2")
+        raise ValueError(f"its format is MSH {version.decode()[:20]}; save it as MSH 4.1 or 2.2")
     if binary not in (b"0", b"1") or head[2:3] != [b"8"]:
         raise ValueError(f"its header is '{b' '.join(head[:3]).decode(errors='replace')[:40]}'; {CUT}")
     if binary == b"1" and not b"".join(head[3:]).startswith(b"\1\0\0\0"):

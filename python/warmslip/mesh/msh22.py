@@ -9,7 +9,7 @@ import numpy as np
 
 from warmslip.mesh.elements import gmsh_element
 from warmslip.mesh.raw import Block, NodeIndex, Raw
-from warmslip.mesh.sections import SHORT, counted, section
+from warmslip.mesh.sections import SHORT, counted, section, whole
 
 
 def parse(data: bytes, binary: bool, raw: Raw) -> None:
@@ -22,7 +22,7 @@ def parse(data: bytes, binary: bool, raw: Raw) -> None:
         raw.tags, raw.nodes = rows["tag"].astype(np.int64), rows["x"].copy()
     else:
         table = numbers.take("real", 4 * count).reshape(-1, 4)
-        raw.tags, raw.nodes = table[:, 0].astype(np.int64), table[:, 1:].copy()
+        raw.tags, raw.nodes = whole(table[:, 0]), table[:, 1:].copy()
     numbers.finish()
     index = NodeIndex(raw.tags, raw.nodes)
     count, numbers = counted(section(data, b"Elements"), binary)

@@ -39,9 +39,7 @@ class Numbers:
         if self._binary:
             return np.frombuffer(self._all, TYPES[kind], count, start)
         found = self._all[start : self._at]
-        if kind != "real" and not (np.abs(found) < 2**53).all():  # nan is not, either
-            raise ValueError(f"a number that counts or names is not a whole one; {CUT}")
-        return found if kind == "real" else found.astype(np.int64)
+        return found if kind == "real" else whole(found)
 
     def one(self, kind: str) -> int:
         return int(self.take(kind, 1)[0])
@@ -56,6 +54,13 @@ class Numbers:
         left = self._all[self._at :]
         if left.strip() if self._binary else len(left):
             raise ValueError(f"a section holds more than it announces; {CUT}")
+
+
+def whole(found: Any) -> Any:
+    """Numbers of a text that count or name, as integers. Raises ValueError for those that do not."""
+    if not (np.abs(found) < 2**53).all():  # nan is not, either
+        raise ValueError(f"a number that counts or names is not a whole one; {CUT}")
+    return found.astype(np.int64)
 
 
 def section(data: bytes, name: bytes, *, optional: bool = False) -> bytes:
