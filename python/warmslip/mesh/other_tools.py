@@ -140,15 +140,12 @@ def _families(families: dict[int, list[str]], tags: list[Any]) -> dict[str, list
 
 def _by_value(name: str, blocks: list[Any]) -> dict[str, list[Any]]:
     """Cells by the value of an array. meshio writes sets as an array called after all of them, with their positions."""
-    values = np.unique(np.concatenate(blocks)).tolist()
-    names = name.split("-")
-    if len(names) < 2 or not set(values) <= {-1, *range(len(names))}:
-        names = []
-    return {
-        names[value] if names else str(value): [np.flatnonzero(block == value) for block in blocks]
-        for value in values
-        if not names or value >= 0
-    }
+    values, names = np.unique(np.concatenate(blocks)).tolist(), name.split("-")
+    if len(names) > 1 and set(values) <= {-1, *range(len(names))}:  # -1 is in no set
+        numbers = dict(enumerate(names))
+    else:
+        numbers = {value: str(value) for value in values}
+    return {one: [np.flatnonzero(block == value) for block in blocks] for value, one in numbers.items()}
 
 
 def _check_abaqus(text: str) -> None:

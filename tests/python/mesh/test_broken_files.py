@@ -143,3 +143,47 @@ def test_codes_of_rows_of_large_numbers_are_those_of_their_nodes() -> None:
 def test_shapes_have_the_corners_of_their_faces() -> None:
     for shape, faces in FACES.items():
         assert {corner for face in faces for corner in face} == set(range(SHAPES[shape][1]))
+
+
+def quadrangle(corners: list[list[float]], numbers: list[int]) -> bytes:
+    """A file of one quadrangle, whose corners have numbers of nodes."""
+    nodes = "\n".join(f"{i} {x} {y} 0" for i, (x, y) in sorted(zip(numbers, corners, strict=True)))
+    tables = f"$Nodes\n4\n{nodes}\n$EndNodes\n$Elements\n1\n1 3 0 {' '.join(map(str, numbers))}\n$EndElements\n"
+    return f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{tables}".encode()
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("tip", [[0.2, 0.2], [0.5, 0.5]], ids=["concave", "three corners in line"])
+def test_a_quadrangle_is_divided_along_the_diagonal_inside(tip: list[float], turn: int) -> None:
+    """The one that ends at the corner of 180 degrees or more."""
+    mesh = convert(gmsh.parse(quadrangle([[0.0, 0], [1, 0], tip, [0, 1]], [1 + (i + turn) % 4 for i in range(4)])), "")
+    sizes = np.linalg.det(mesh.nodes[mesh.cells[:, 1:]] - mesh.nodes[mesh.cells[:, :1]]) / 2
+    assert sizes == pytest.approx([tip[0] / 2, tip[0] / 2])
+
+
+def test_a_quadrangle_that_crosses_itself_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"two cells overlap|is flat"):
+        convert(gmsh.parse(quadrangle([[0.0, 0], [1, 0], [0, 1], [1, 1.5]], [1, 2, 3, 4])), "")
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-15])
+def test_nodes_at_one_place_are_to_be_merged(gap: float) -> None:
+    """A ring that is not closed: the body is in one piece."""
+    angles = np.append(np.linspace(0, 2 * np.pi, 13)[:-1], gap)
+    nodes = [(r * np.cos(a), r * np.sin(a)) for a in angles for r in (1, 2)]
+    cells = [(2 * i + 1, 2 * i + 2, 2 * i + 4, 2 * i + 3) for i in range(12)]
+    tables = [
+        f"$Nodes\n{len(nodes)}",
+        *(f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(np.array(nodes).tolist(), 1)),
+        "$EndNodes",
+    ]
+    tables += [
+        "$Elements\n12",
+        *(f"{i} 3 0 {a} {b} {c} {d}" for i, (a, b, c, d) in enumerate(cells, 1)),
+        "$EndElements\n",
+    ]
+    data = "\n".join(["$MeshFormat\n2.2 0 8\n$EndMeshFormat", *tables]).encode()
+    with pytest.raises(
+        ValueError, match=r"^4 nodes lie where another one does, such as 1 and 25 at \(1, 0\); merge them"
+    ):
+        convert(gmsh.parse(data), "")

@@ -140,6 +140,20 @@ def test_what_would_be_lost_is_refused(old: str, new: str, words: str, tmp_path:
 
 
 @pytest.mark.filterwarnings("ignore")
+def test_cells_in_no_set_are_in_none(tmp_path: Path) -> None:
+    """meshio marks them by -1 in the array that it writes."""
+    mesh = with_sets()
+    del mesh.cell_sets["top"], mesh.cell_sets["left_half"]
+    mesh.write(tmp_path / "plate.vtu")
+    assert sizes(tmp_path / "plate.vtu")[1] == {"bottom": 2.0, "right_half": 1.0}
+    mesh = with_sets()
+    mesh.cell_sets["right_half"] = [np.empty(0, int)] * 3
+    mesh.write(tmp_path / "empty.vtu")
+    with pytest.raises(ValueError, match="its cell set 'right_half' is empty"):
+        files.read(str(tmp_path / "empty.vtu"))
+
+
+@pytest.mark.filterwarnings("ignore")
 def test_several_arrays_are_no_sets(tmp_path: Path) -> None:
     mesh = numbered("part")
     mesh.cell_data["other"] = mesh.cell_data["part"]
