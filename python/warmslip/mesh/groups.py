@@ -36,10 +36,10 @@ def named(raw: Raw, dim: int, groups: dict[int, Any]) -> tuple[dict[str, Any], l
     ValueError
         For a name without members, or a group without a name beside others with one.
     """
-    numbers: dict[str, list[int]] = {}
+    numbers: dict[str, dict[int, None]] = {}
     for of, tag, name in raw.names:
-        if of == dim and tag not in numbers.setdefault(name, []):
-            numbers[name].append(tag)
+        if of == dim:
+            numbers.setdefault(name, {})[tag] = None
     if not numbers:
         return {str(tag): members for tag, members in groups.items()}, []
     if lost := sorted(set(groups).difference(*numbers.values())):

@@ -149,13 +149,18 @@ def _by_value(name: str, blocks: list[Any]) -> dict[str, list[Any]]:
 
 
 def _check_abaqus(text: str) -> None:
-    """Raises ValueError for sets that meshio assigns to other elements, or loses."""
-    lines = [
-        line.upper().replace(" ", "") for line in re.findall(r"^\*ELEMENT\b.*", text, re.MULTILINE | re.IGNORECASE)
-    ]
-    sets = [found[1] for line in lines if (found := re.search(r",ELSET=([^,]+)", line))]
-    more = re.findall(r"^\*ELSET\s*,.*?ELSET\s*=\s*([^,\s]+)", text, re.MULTILINE | re.IGNORECASE)
-    if sets and (len(set(sets)) < len(lines) or {name.upper() for name in more} & set(sets)):
+    """Raises ValueError for what meshio assigns to other elements, or loses."""
+    lines = re.findall(r"^\*\s*(NODE|ELEMENT|ELSET|INCLUDE)\s*(?:,(.*))?$", text.upper(), re.MULTILINE)
+    if any(word == "INCLUDE" for word, _ in lines):
+        raise ValueError("it includes another file; write the mesh into one")
+    if sum(word == "NODE" for word, _ in lines) > 1:
+        raise ValueError("it has several *NODE blocks, of which meshio reads the last; write all nodes into one")
+    sets = [(word, re.search(r"\bELSET\s*=\s*([^,\s]+)", options)) for word, options in lines]
+    of_elements = [name and name[1] for word, name in sets if word == "ELEMENT"]
+    others = {name[1] for word, name in sets if word == "ELSET" and name}
+    if any(of_elements) and (
+        None in of_elements or len(set(of_elements)) < len(of_elements) or others & set(of_elements)
+    ):
         raise ValueError(
             "some *ELEMENT lines share an ELSET or have none; give each line an ELSET of its own, or write *ELSET lines"
         )

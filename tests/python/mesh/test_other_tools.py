@@ -87,7 +87,10 @@ def test_sets_of_cells_are_parts_and_regions(file: str, tmp_path: Path) -> None:
 
 
 def test_a_scene_on_a_mesh_of_abaqus(tmp_path: Path) -> None:
+    """Keywords of a step do not matter."""
     abaqus(tmp_path / "plate.inp")
+    with (tmp_path / "plate.inp").open("a") as file:
+        file.write("*STEP\n*NODE OUTPUT\nU\n*ELEMENT OUTPUT, ELSET=bottom\nS\n*END STEP\n")
     found = warmslip.run(
         build(
             {
@@ -119,6 +122,17 @@ def test_blocks_of_exodus_are_parts_and_regions(tmp_path: Path) -> None:
             "right_half\nbottom, top, left_half",
             "'right_half' lists other sets, or",
         ),
+        ("TYPE=CPS4", "TYPE=CPS4, elset = bottom", "some .ELEMENT lines share an ELSET or have none"),
+        (
+            "*ELEMENT, TYPE=CPS3",
+            "*NODE\n9, 5, 5, 0\n*ELEMENT, TYPE=CPS3",
+            "several .NODE blocks, of which meshio reads the last",
+        ),
+        (
+            "*ELEMENT, TYPE=CPS3",
+            "*Include, input=more.inp\n*ELEMENT, TYPE=CPS3",
+            "it includes another file; write the mesh into one",
+        ),
         ("TYPE=CPS4", "TYPE=CPS4, ELSET=right", "some .ELEMENT lines share an ELSET or have none; give each line"),
         ("TYPE=T2D2", "TYPE=NOTHING", "meshio cannot read it .*; export the mesh again, or as MSH 4.1"),
         ("7, 5, 6", "7, 5, 66", "meshio cannot read it .66.; export the mesh again"),
@@ -128,7 +142,7 @@ def test_blocks_of_exodus_are_parts_and_regions(tmp_path: Path) -> None:
             "'early' lists other sets, or stands before some of the cells; list its cells",
         ),
     ],
-    ids=["empty", "set of sets", "half of the lines", "type", "node", "early"],
+    ids=["empty", "set of sets", "shared", "nodes", "include", "half of the lines", "type", "node", "early"],
 )
 def test_what_would_be_lost_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
     abaqus(tmp_path / "plate.inp")
