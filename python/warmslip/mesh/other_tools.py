@@ -87,8 +87,11 @@ def _elements(cells: Any, count: int) -> tuple[str, Any]:
         raise ValueError(
             f"it holds cells of the type {cells.type}; mesh with triangles, tetrahedra, or what divides into them"
         )
+    corners = SHAPES[shape][1]
     nodes = np.asarray(cells.data, np.int64)
-    if nodes.size and not (nodes.min() >= 0 and nodes.max() < count and nodes.shape[1] >= SHAPES[shape][1]):
+    if nodes.size == 0:
+        nodes = np.empty((0, corners), np.int64)
+    elif nodes.ndim != 2 or nodes.shape[1] < corners or nodes.min() < 0 or nodes.max() >= count:
         raise ValueError("a cell names a node that the file does not hold; export the mesh again")
     return shape, nodes
 

@@ -142,7 +142,17 @@ def test_blocks_of_exodus_are_parts_and_regions(tmp_path: Path) -> None:
             "'early' lists other sets, or stands before some of the cells; list its cells",
         ),
     ],
-    ids=["empty", "set of sets", "shared", "nodes", "include", "half of the lines", "type", "node", "early"],
+    ids=[
+        "empty",
+        "set of sets",
+        "shared",
+        "nodes",
+        "include",
+        "half of the lines",
+        "type",
+        "node",
+        "early",
+    ],
 )
 def test_what_would_be_lost_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
     abaqus(tmp_path / "plate.inp")
@@ -201,3 +211,15 @@ def test_what_is_no_set_of_cells_is_refused(members: list[Any], words: str) -> N
     """meshio puts sets into a set of sets where a block of cells should be."""
     with pytest.raises(ValueError, match=f"its cell set 'some' {words}"):
         other_tools._members("some", members, 3)
+
+
+def test_a_block_without_cells_is_none(tmp_path: Path) -> None:
+    abaqus(tmp_path / "plate.inp")
+    text = (tmp_path / "plate.inp").read_text()
+    (tmp_path / "plate.inp").write_text(
+        text.replace("3, 2, 3, 6, 5\n", "").replace("*ELSET, ELSET=right_half\n3,\n", "")
+    )
+    mesh, found = sizes(tmp_path / "plate.inp")
+    assert found == {"left_half": 1.0}
+    assert mesh.no_parts["bottom"] == "has 1 of 2 facets that are no side of any cell"
+    assert mesh.notes == ("nodes without a cell, such as centres of arcs, left out: 2",)
