@@ -1,1 +1,1 @@
-"""Meshes from files: read, checked, refined. No compiled code."""
+"""Meshes from files: read, checked, measured, refined. No compiled code."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warmslip.mesh.files import MeshFile
+from warmslip.mesh.conversion import MeshFile
 
 # children by corner and edge midpoint: i is corner i, ij the middle of corners i and j
 EDGE = ["0 01", "01 1"]

@@ -22,6 +22,7 @@ TIMES = 16  # at which data that depend on time are looked at
 def before(d: Discretisation) -> list[str]:
     """All warnings before the first step. Nothing of functions in Python, which are not asked without need."""
     return [
+        *plausible_data.of_mesh(d.scene),
         *([] if "loads" in d.user_functions else plausible_data.of_scene(d.scene)),
         *_gaps(d),
         *_starts(d),

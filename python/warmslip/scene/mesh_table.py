@@ -30,7 +30,7 @@ def _kind(value: Any) -> str:
 
 
 class MeshTable(Table):
-    """A structured box, `n` cells per side (or one number an axis), each cut along `diagonal`; or a gmsh `file`.
+    """A structured box, `n` cells per side (or one number an axis), each cut along `diagonal`; or a mesh `file`.
 
     `grading` is the size of cells at the far end of an axis over that at the near one, one number an axis: cells grow in
     geometric progression, and the last of n is grading^((n - 1)/n) times the first.
@@ -57,7 +57,8 @@ class MeshTable(Table):
     supports and materials (in space these are edges), names of parts, points, or tables { at = "top", exponent = 0.75 }. The mesh
     is halved from the coarsest one that n allows, with four cells along an axis or more; a file needs refine."""
     file: str | None = None
-    """A gmsh file with physical names, beside the scene file; takes the place of all other keys here but refine and graded_to."""
+    """A mesh file beside the scene file: gmsh (MSH 4.1 or 2.2), or .vtu, .inp, .med, .exo, .bdf. Its physical groups or cell sets
+    are the parts and regions. Takes the place of all other keys here but refine and graded_to."""
     refine: Annotated[int, Field(ge=0, le=6, strict=True)] = 0
     """How many times the cells of a file are halved."""
 
@@ -78,6 +79,18 @@ class MeshTable(Table):
         if self.file is not None:
             return tuple(files.read(self.file).parts)
         return PARTS[self.shape or "square"]
+
+    @property
+    def no_parts(self) -> dict[str, str]:
+        """Named groups of a mesh file that are no boundary parts, and why."""
+        return files.read(self.file).no_parts if self.file is not None else {}
+
+    def unknown(self, part: str) -> str:
+        """A sentence on a name that is no boundary part, with the names that are."""
+        has = ", ".join(self.parts) or "no named part; give its facets physical names"
+        if part in self.no_parts:
+            return f"'{part}' is no boundary part: it {self.no_parts[part]}; a {self.name} has {has}"
+        return f"unknown boundary part '{part}'; a {self.name} has {has}"
 
     @property
     def regions(self) -> tuple[str, ...]:
@@ -151,7 +164,11 @@ class MeshTable(Table):
         for one in self.gradings:
             if isinstance(one.at, str) and one.at != "corners" and one.at not in self.parts:
                 known = ", ".join(["corners", *self.parts])
-                raise ValueError(f"graded_to: there is no part '{one.at}'; a {self.name} has {known}, or give a point")
+                if one.at in self.no_parts:
+                    why = f"'{one.at}' is no boundary part: it {self.no_parts[one.at]}"
+                else:
+                    why = f"there is no part '{one.at}'"
+                raise ValueError(f"graded_to: {why}; a {self.name} has {known}, or give a point")
             if isinstance(one.at, list) and len(one.at) != self.dim:
                 raise ValueError(f"graded_to: the point {one.at} needs {self.dim} coordinates")
         if self.halvings == 0 and self.file is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from warmslip.mesh import files, measures
 from warmslip.scene import plausible_data
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import constant
@@ -17,6 +18,7 @@ from warmslip.scene.validation import contact_keys, coupling_tables
 class Plan:
     """What `explain` prints. Sentences name the keys of the scene; `removable` are keys whose removal changes no number."""
 
+    mesh: list[str]  # sizes of a mesh file, its parts and regions
     fields: list[str]
     operators: list[str]
     every_step: list[str]
@@ -159,6 +161,7 @@ def plan(scene: Scene) -> Plan:
         ]
     steps += _heat_by_contact(touching)
     return Plan(
+        mesh=measures.lines(files.read(scene.mesh.file)) if scene.mesh.file is not None else [],
         fields=fields,
         operators=[f"{name}: constant, assembled once" for name, there in present.items() if there],
         every_step=steps,
@@ -167,7 +170,7 @@ def plan(scene: Scene) -> Plan:
         missing=_missing(scene),
         suspicious=_suspicious(scene),
         assumed=_assumed(scene),
-        warnings=plausible_data.of_scene(scene),
+        warnings=[*plausible_data.of_mesh(scene), *plausible_data.of_scene(scene)],
     )
 
 
@@ -291,6 +294,7 @@ def text(found: Plan) -> str:
         return [title, *(f"  {line}" for line in lines)] if lines else []
 
     out = [
+        *block("mesh", found.mesh),
         *block("fields", found.fields),
         *block("operators", found.operators),
         *block("every step", found.every_step),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from warmslip.mesh import files
 from warmslip.scene.expressions import constant
 from warmslip.scene.material_tables import IsotropicTable
 from warmslip.scene.scene import Scene
@@ -22,6 +23,24 @@ GROWS = (
     "rounding may then grow from step to step, and the digits are those of single steps; compare with a run whose mesh.lengths "
     "differ by 1e-12"
 )
+
+
+def of_mesh(scene: Scene) -> list[str]:
+    """What the reader of a mesh file changed, and regions of the file that share cells."""
+    if scene.mesh.file is None:
+        return []
+    mesh = files.read(scene.mesh.file)
+    out = [f"mesh.file: {remark}" for remark in mesh.remarks]
+    before = np.zeros(len(mesh.cells), bool)
+    for name, region in scene.regions.items():
+        if region.where is None:
+            own = mesh.regions[name]
+            if count := int(before[own].sum()):
+                out.append(
+                    f"regions.{name}: it has {count} cells of the mesh file in common with regions before it, and replaces them"
+                )
+            before[own] = True
+    return out
 
 
 def of_scene(scene: Scene) -> list[str]:

@@ -56,8 +56,7 @@ def _parts(scene: SceneTables) -> Iterator[str]:
     for key, parts in named.items():
         for part in parts:
             if part not in known:
-                has = ", ".join(known) or "no named part; give its facets physical names"
-                yield f"{key}: unknown boundary part '{part}'; a {scene.mesh.name} has {has}"
+                yield f"{key}: {scene.mesh.unknown(part)}"
         if len(set(parts)) < len(parts):
             yield f"{key}: a part is named twice; name each once"
     for part in scene.loads.traction:

@@ -27,9 +27,9 @@ def theirs(path: Path) -> tuple[np.ndarray, dict[tuple[int, int], set[tuple[int,
 def ours(path: Path) -> tuple[np.ndarray, dict[tuple[int, int], set[tuple[int, ...]]]]:
     raw = gmsh.parse(path.read_bytes())
     found: dict[tuple[int, int], set[tuple[int, ...]]] = {}
-    for size, nodes, groups in raw.blocks:
-        for tag in groups:
-            found.setdefault((size, tag), set()).update(map(tuple, nodes.tolist()))
+    for block in raw.blocks:
+        for member, tag in zip(block.member.tolist(), block.group.tolist(), strict=True):
+            found.setdefault((block.nodes.shape[1], tag), set()).add(tuple(block.nodes[member].tolist()))
     return raw.nodes, found
 
 

@@ -255,13 +255,18 @@ def spoiled(tmp_path: Path, **change: Any) -> str:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"cells": [("triangle", np.array([[0, 1, 2], [0, 3, 2]]))]}, r"cell 1 \(nodes 0, 3, 2\) is inverted"),
-        ({"points": FLAT}, "cell 0 .* is flat"),
-        ({"points": np.vstack([SQUARE, [5, 5, 0]])}, "node 4 belongs to no cell"),
-        ({"cells": [("line", np.array([[0, 1]]))]}, "no triangles and no tetrahedra"),
-        ({"points": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]])}, "do not lie in a plane"),
-        ({"names": {"bottom": [1, 1], "top": [7, 1]}}, "the part 'top' is empty"),
-        ({"cells": [("triangle6", np.array([[0, 1, 2, 3, 3, 3]]))]}, "only triangles and tetrahedra of first order"),
+        (
+            {"cells": [("triangle", np.array([[0, 1, 2], [0, 1, 3]]))]},
+            "two cells overlap: they lie on one side of the facet of the nodes 1, 2; repair the mesh",
+        ),
+        ({"points": FLAT}, "the cell of the nodes 1, 2, 3 is flat; repair the mesh"),
+        ({"cells": [("line", np.array([[0, 1]]))]}, "no cells; mesh the body"),
+        (
+            {"points": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]])},
+            "a surface in space, with z from 0 to 1",
+        ),
+        ({"names": {"bottom": [1, 1], "top": [7, 1], "body": [2, 2]}}, "the physical group 'top' of curves is empty"),
+        ({"names": {"top": [7, 1]}}, "the physical group 1 of curves has no name, and 'top' has"),
         (
             {
                 "points": np.vstack([[[0.0, 0, 0], [1, 0, 0], [1, 1, 0]], [[5.0, 5, 0], [6, 5, 0], [6, 6, 0]]]),
@@ -270,7 +275,7 @@ def spoiled(tmp_path: Path, **change: Any) -> str:
             "the body is in 2 pieces",
         ),
     ],
-    ids=["inverted", "flat", "orphan", "no cells", "not plane", "empty part", "second order", "two pieces"],
+    ids=["overlap", "flat", "no cells", "not plane", "empty part", "no name", "two pieces"],
 )
 def test_a_faulty_mesh_is_refused_by_name(tmp_path: Path, change: dict[str, Any], words: str) -> None:
     change = {
