@@ -141,7 +141,7 @@ def checkpoints(data: bytes) -> bool:
         data = file.getvalue()
     (simulation, start), path = _simulation(), _written(checkpoint.NAMES[0], data)
     try:
-        found = checkpoint.read(path.parent, start)
+        found = checkpoint.read(path.parent, start, start.owner["scene"])
     except ValueError as error:
         return _refused(error)
     if found is None:
