@@ -18,7 +18,7 @@ from warmslip.scene.scene import Scene
 if TYPE_CHECKING:
     from warmslip.io.trajectory import Trajectory
     from warmslip.model.contact_laws import Law
-    from warmslip.model.discretisation import Discretisation, discretise
+    from warmslip.model.discretisation import Discretisation, discretise, von_mises
     from warmslip.model.loads import Loads
     from warmslip.model.state import State
     from warmslip.simulation.run import Result
@@ -40,6 +40,7 @@ __all__ = [
     "load",
     "run",
     "sweep",
+    "von_mises",
 ]
 
 __version__ = metadata.version("warmslip")
@@ -56,6 +57,7 @@ _LAZY = {
     "State": "model.state",
     "Trajectory": "io.trajectory",
     "sweep": "studies.sweep",
+    "von_mises": "model.discretisation",
 }
 
 
@@ -65,3 +67,8 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     raise AttributeError(f"module 'warmslip' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """The public names, those included that are loaded when they are first needed."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

@@ -24,7 +24,7 @@ def function(x: Any, t: Any = 0.0) -> Any:
 
 
 def test_about_a_dozen_names_all_keyword_only_but_the_first() -> None:
-    assert len(warmslip.__all__) == 13
+    assert len(warmslip.__all__) == 14
     for name in ("run", "discretise", "Simulation"):
         _, *more = [p for p in inspect.signature(getattr(warmslip, name)).parameters.values() if p.name != "self"]
         assert all(p.kind is p.KEYWORD_ONLY for p in more), name
@@ -56,6 +56,29 @@ def test_observers_see_every_step(small: Small) -> None:
     )
     assert [step for step, *_ in seen] == [1, 2, 3, 4]
     assert seen[-1][1:] == (1.0, done.summary["contact"]["normal_force"])
+
+
+def test_stress_at_the_nodes_is_the_mean_of_the_cells_around(small: Small) -> None:
+    """Of a linear function at the centroids the mean over a symmetric patch is its value at the node; sums are kept."""
+    simulation = warmslip.Simulation(small())
+    d = simulation.discretisation
+    state, _ = next(simulation.steps())
+    x, cells = np.asarray(d.mesh.nodes), np.asarray(d.mesh.cells)
+    centroids = x[cells].mean(axis=1)
+    inner = np.flatnonzero((np.abs(x - 0.5) < 0.49).all(axis=1))
+    assert np.allclose(d.nodal(centroids)[inner], x[inner])
+    assert d.volumes.sum() == pytest.approx(1.0) and np.allclose(d.nodal(np.ones(len(cells))), 1.0)
+    corner = np.flatnonzero((x == [1.0, 0.0]).all(axis=1))
+    around = np.flatnonzero((cells == corner).any(axis=1))
+    assert np.allclose(state.nodal_stress[corner[0]], state.stress[around].mean(axis=0))
+    graded = warmslip.discretise(small(mesh__grading=[30.0, 1.0]))
+    values, node = np.arange(32.0), 12
+    around = (np.asarray(graded.mesh.cells) == node).any(axis=1)
+    expected = (graded.volumes * values)[around].sum() / graded.volumes[around].sum()
+    assert graded.nodal(values)[node] == pytest.approx(expected, rel=1e-12)
+    assert np.allclose(warmslip.von_mises(state.stress, state.stress_zz), state.mises)
+    with pytest.raises(ValueError, match=r"stress: the shape is \(32,\)"):
+        warmslip.von_mises(state.mises)
 
 
 def test_operators_and_factors_are_petsc_objects(small: Small) -> None:

@@ -78,6 +78,7 @@ for panel, commands in PANELS.items():
 
 def main() -> None:
     """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
+    os.environ.setdefault("MPLBACKEND", "Agg")  # files are drawn, and no window
     try:
         code = app(
             prog_name="warmslip", standalone_mode=False

@@ -224,7 +224,13 @@ def draw(
     """Draw a figure from tables."""
     import warmslip.figures as figures
 
-    figures.draw(kind, inputs, out)
+    figures.draw(kind, inputs, out, _contact_parts)
+
+
+def _contact_parts(path: Path) -> list[Any]:
+    from warmslip.io import drawn  # the compiled core, which other figures do not need
+
+    return drawn.lines(path)
 
 
 def trade(

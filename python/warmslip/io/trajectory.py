@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import h5py
 import numpy as np
 
+from warmslip.io.stored_contact import StoredContact
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
+from warmslip.messages import Shown, quoted
+from warmslip.model.contact_output import ContactFields
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
 from warmslip.typing import Array
@@ -51,7 +55,7 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
     return tuple(data.shape)
 
 
-class Trajectory:
+class Trajectory(Shown):
     """Read access to a stored run.
 
     Fields are read when they are indexed; a field that the scene does not have is None. Use it in a `with` block.
@@ -94,6 +98,19 @@ class Trajectory:
         except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
             self._file.close()
             raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
+
+    def _facts(self) -> dict[str, str]:
+        facts = {"": quoted(self.scene.get("title", "")), "file": str(self.path)}
+        if not self._file:
+            return facts | {"state": "closed"}
+        there = [name for name in ("u", "w", "theta") if f"states/{name}" in self._file]
+        points = len(self._file["contact/weights"])
+        return facts | {
+            "steps": str(self._steps),
+            "states": f"{self._states} to t = {self.time[-1]:g}",
+            "fields": ", ".join(there),
+            "contact points": str(points),
+        }
 
     def _whole(self) -> tuple[int, int]:
         """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
@@ -157,6 +174,47 @@ class Trajectory:
         if not -self._steps <= step < self._steps:
             raise IndexError(f"there are {self._steps} steps, and none with the number {step}")
         return self._read[f"contact/{name}"][step % self._steps]
+
+    @cached_property
+    def _stored_contact(self) -> StoredContact:
+        return StoredContact(self._file, self.scene, self._steps, self._states, set(self.functions))
+
+    def contact_on(self, part: str | None = None, time: float | None = None) -> ContactFields:
+        """Contact fields of a part at the end of a step, ordered along it.
+
+        Parameters
+        ----------
+        part : str, optional
+            Name of a contact part; not needed where there is only one.
+        time : float, optional
+            The nearest step is taken; the last one by default.
+
+        Returns
+        -------
+        ContactFields
+            Arc length, pressure, friction traction and its bound, slip, gap, status; temperature where the state is stored.
+
+        Raises
+        ------
+        ValueError
+            For a part without contact points, a run without steps, and a time beyond the run.
+        """
+        self._read  # noqa: B018  it refuses once the file is closed
+        return self._stored_contact.near(part, time)
+
+    def contact_history(self, part: str | None = None) -> ContactFields:
+        """Contact fields of a part at the ends of all steps, as `contact_on`: arrays (steps, points).
+
+        Raises ValueError for a part without contact points and a run without steps.
+        """
+        self._read  # noqa: B018
+        return self._stored_contact.history(part)
+
+    @property
+    def contact_parts(self) -> list[str]:
+        """Names of the parts that have contact points."""
+        self._read  # noqa: B018
+        return list(self._stored_contact.points)
 
     def discretisation(self) -> Discretisation:
         """The scene assembled again on this process, with the loads and laws that it states.
