@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -78,6 +78,7 @@ def study(
         rows,
         refinement_study.stamp(checked, levels=levels, reference=reference, grid=grid, steps_per_level=steps_per_level),
     )
+    typer.echo(tables.aligned(rows, ("n", "steps", "h", "k", "e_u_V", "e_w_L2", "e_theta_L2", "cpu_seconds")))
 
 
 def manufactured(
@@ -134,8 +135,10 @@ def blocks(
         tables.write(explained, rows, refinement_study.stamp(None))
 
 
-def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
-    """Writes a table made from other tables; ValueError when those are not what they should be."""
+def _derived(
+    out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path], shown: Sequence[str] = ()
+) -> None:
+    """Writes a table made from other tables and prints the columns `shown`; ValueError for tables that will not do."""
     from warmslip.records import provenance
 
     names = [p.name for p in sources]
@@ -144,20 +147,17 @@ def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[
     except (LookupError, TypeError, UnicodeDecodeError, ZeroDivisionError) as error:
         raise ValueError(f"{', '.join(names)}: not tables that `warmslip study` wrote ({error!r})") from error
     tables.write(out, rows, provenance.stamp(sources=names))
+    if shown:
+        typer.echo(tables.aligned(rows, shown))
 
 
 def rates(tables: Tables, out: Csv) -> None:
     """Observed, bias-corrected and expected orders of studies."""
     from warmslip.studies import rates as orders
+    from warmslip.studies.work_precision import scene_of
 
-    _derived(out, lambda: [row for path in tables for row in orders.table(path, _scene_of(path))], tables)
-
-
-def _scene_of(path: Path) -> dict[str, Any]:
-    try:
-        return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
-    except (FileNotFoundError, ValueError, LookupError, TypeError) as error:
-        raise ValueError(f"'{path}' is no table of `warmslip study` with its stamp beside it; give one") from error
+    shown = ("case", "term", "h", "error", "observed", "corrected", "expected")
+    _derived(out, lambda: [row for path in tables for row in orders.table(path, scene_of(path))], tables, shown)
 
 
 def readings(tables: Tables, out: Csv) -> None:
@@ -171,7 +171,8 @@ def work(tables: Tables, out: Csv) -> None:
     """Work against precision of every run of studies, with the front."""
     from warmslip.studies import work_precision
 
-    _derived(out, lambda: work_precision.table(tables), tables)
+    shown = ("problem", "case", "coupling", "quadrature", "n", "steps", "error", "cpu_seconds", "front")
+    _derived(out, lambda: work_precision.table(tables), tables, shown)
 
 
 def judge(

@@ -30,7 +30,7 @@ KINDS = {
     "study": ("study", "any study, a panel each"),
     "error": ("error", "error.csv of a run with --estimate"),
     "sweep": ("sweep", "the table of a sweep"),
-    "corrected": ("convergence", "the table of rates, then studies it speaks of"),
+    "corrected": ("convergence", "the table of rates, then any studies it speaks of"),
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
     "table": ("maps", "the table of readings"),
     "extremes": ("maps", "the table of extremes"),

@@ -14,6 +14,8 @@ from matplotlib.figure import Figure
 INK, GREY, PALE = "#222222", "#8a8a8a", "#eeeeee"
 BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#a0528d", "#56b4e9"
 
+COUPLINGS = ("staggered", "lagged", "monolithic")
+
 # the terms of the theorem, their symbols and colours
 TERMS = {
     "u_V": (r"$|u-u^{hk}|_V$", BLUE, "o"),
@@ -59,13 +61,20 @@ class Case(NamedTuple):
         return rf"$\theta_F = {self.theta}$"
 
 
-def case(name: str | Path) -> Case:
+def named(name: str | Path) -> Case | None:
+    """What a file name READING_THETA_COUPLING says, None for another name."""
     words = Path(name).stem.split("_")
-    if len(words) not in (3, 4):
+    return Case(*words) if len(words) in (3, 4) and words[2] in COUPLINGS else None
+
+
+def case(name: str | Path) -> Case:
+    """As `named`. Raises ValueError for another name."""
+    found = named(name)
+    if found is None:
         raise ValueError(
             f"'{Path(name).stem}' is not called READING_THETA_COUPLING; `warmslip draw study` draws any study"
         )
-    return Case(*words)
+    return found
 
 
 def applied() -> AbstractContextManager[None]:

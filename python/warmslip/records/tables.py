@@ -44,3 +44,20 @@ def write(path: Path, rows: Iterable[Mapping[str, Any]], stamp: Mapping[str, Any
         out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in row.values()] for row in table)
     if stamp is not None:
         path.with_suffix(".json").write_text(json.dumps(stamp, indent=2) + "\n")
+
+
+def aligned(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> str:
+    """Some columns of a table as text for a terminal, numbers with four digits; columns without a value are left out."""
+    table = [dict(row) for row in rows]
+    cells = {name: [_cell(row.get(name)) for row in table] for name in columns}
+    there = {name: values for name, values in cells.items() if any(value not in ("", "-", "0") for value in values)}
+    widths = {name: max(map(len, [name, *values])) for name, values in there.items()}
+    lines = [[name.rjust(widths[name]) for name in there]]
+    lines += [[there[name][i].rjust(widths[name]) for name in there] for i in range(len(table))]
+    return "\n".join("  ".join(line) for line in lines)
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}" if value == value else "-"
+    return {True: "yes", False: "no"}[value] if isinstance(value, bool) else str(value)
