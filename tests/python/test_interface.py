@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import io
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -95,9 +96,46 @@ def test_a_trajectory_as_xarray(small: Small, tmp_path: Path) -> None:
     done = warmslip.run(small(), out=tmp_path)
     with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
         data = stored.xarray()
-    assert dict(data.sizes) == {"time": 5, "node": 25, "axis": 2}
+        contact, steps = stored.contact_on(time=0.5), stored.series("steps")
+        balances = stored.series("balances")
+    assert dict(data.sizes) == {"time": 5, "node": 25, "axis": 2, "step": 4, "point": 5}
+    here = data.sel(step=0.5)
+    for name in ("pressure", "traction", "slip", "gap", "status", "friction_bound"):
+        assert np.array_equal(here[f"contact_{name}"], getattr(contact, name)), name
+    assert np.array_equal(here.arc_length, contact.arc_length) and set(here.part.values) == {"bottom"}
+    assert np.array_equal(data.normal_force, steps["normal_force"])
+    assert np.array_equal(data.balance_viscous, balances["viscous"])
+    total = float((here.contact_pressure * here.contact_weight).sum())
+    assert total == pytest.approx(float(here.normal_force), rel=1e-12)
     assert np.array_equal(data.u.isel(time=-1).values, done.u)
     assert float(data.theta.sel(time=1.0)[np.argmax(done.theta)]) == done.theta.max()
+
+
+@pytest.mark.parametrize("scene", ["heat_slab", "block_3d"])
+def test_of_any_run_an_xarray(scene: str, tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    keys = ["time.steps=2"] if scene == "heat_slab" else ["time.steps=2", "mesh.n=2"]
+    warmslip.run(warmslip.load(scene, keys), out=tmp_path)
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        data = stored.xarray()
+    assert ("contact_traction" in data) == (scene == "block_3d") and "arc_length" not in data
+    if scene == "block_3d":
+        assert data.contact_traction.dims == ("step", "point", "axis")
+
+
+@pytest.mark.parametrize("more", [{}, {"error": 0.3}])
+def test_progress_is_that_of_the_command(small: Small, monkeypatch: pytest.MonkeyPatch, more: dict[str, Any]) -> None:
+    from rich.console import Console
+
+    from warmslip.simulation import progress
+
+    screen = io.StringIO()
+    monkeypatch.setattr(progress, "console", Console(file=screen, force_terminal=True, width=120))
+    done = warmslip.run(small(), progress=True, **more)
+    assert f"{done.summary['steps']}/{done.summary['steps']}" in screen.getvalue() and "stick" in screen.getvalue()
+    before = len(screen.getvalue())
+    warmslip.run(small(), progress=False)
+    assert len(screen.getvalue()) == before
 
 
 def test_resultants_of_every_part(tmp_path: Path) -> None:

@@ -14,9 +14,9 @@ import typer
 from rich.logging import RichHandler
 
 from warmslip.cli import scene, study, sweep, verify
-from warmslip.cli.options import console
 from warmslip.scene.errors import SceneError
 from warmslip.simulation import ranks
+from warmslip.simulation.progress import console
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 

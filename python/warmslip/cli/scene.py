@@ -11,10 +11,11 @@ from typing import Annotated, Any
 
 import typer
 
-from warmslip.cli.options import SceneName, Set, console, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
+from warmslip.simulation.progress import console, progress_bar, stepping
 
 RunFolder = Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")]
 
@@ -78,14 +79,7 @@ def run(
         checked = answer.scene
     for odd in plan.plan(checked).suspicious if rank == 0 else ():
         console.print(f"note: {odd}", highlight=False, soft_wrap=True, markup=False)
-    with progress_bar(rank) as bar:
-        task = bar.add_task("stepping", total=checked.clock.steps, note="")
-
-        def progress(step: int, steps: int, report: Any) -> None:
-            bar.update(
-                task, completed=step, total=steps, note=f"open {report.open} stick {report.stick} slip {report.slip}"
-            )
-
+    with stepping(checked.clock.steps, rank) as progress:
         result = run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if answer is not None:
         _tell_error(result, answer, wanted, out, rank)

@@ -9,12 +9,13 @@ from typing import Annotated, Any
 
 import typer
 
-from warmslip.cli.options import SceneName, Set, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.figures import KINDS
 from warmslip.records import tables
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.full import full_model
+from warmslip.simulation.progress import progress_bar
 
 Csv = Annotated[Path, typer.Option(help="the CSV file to write; its stamp goes beside it as .json")]
 Tables = Annotated[list[Path], typer.Argument(help="tables written by `warmslip study`")]

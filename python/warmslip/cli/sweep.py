@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from warmslip.cli.options import SceneName, Set, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.overrides import parse
+from warmslip.simulation.progress import progress_bar
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:

@@ -246,25 +246,18 @@ class Trajectory(Shown):
         }
 
     def xarray(self) -> Any:
-        """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.
+        """The run as an `xarray.Dataset`: states, contact fields of every step, and the series of steps and balances.
+
+        The states u, w, theta are over time, node and axis, with positions x, y, z as coordinates of the nodes. The contact
+        fields, `contact_pressure` and so on, are over step and point, in the order of `contact_history`, with part and arc length
+        as coordinates of the points. The series are over step, the balances with the prefix `balance_`; `step` is the time at the
+        end of each.
 
         Raises RuntimeError when xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise RuntimeError("xarray is not installed; pip install xarray") from None
-        axes = list("xyz"[: self.nodes.shape[1]])
-        fields = {"u": ("time", "node", "axis"), "w": ("time", "node", "axis"), "theta": ("time", "node")}
-        return xarray.Dataset(
-            {
-                name: (dims, np.asarray(getattr(self, name)))
-                for name, dims in fields.items()
-                if getattr(self, name) is not None
-            },
-            {"time": self.time, "axis": axes, **{a: ("node", self.nodes[:, i]) for i, a in enumerate(axes)}},
-            {"title": self.scene.get("title", "")},
-        )
+        from warmslip.io.dataset import dataset
+
+        return dataset(self)
 
     def close(self) -> None:
         """Closes the file; a `with` block does."""
