@@ -8,6 +8,8 @@ result = warmslip.run(scene, out="results/runs/first")
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +27,11 @@ if TYPE_CHECKING:
     from warmslip.simulation.simulation import Simulation
     from warmslip.studies.accuracy import run
     from warmslip.studies.sweep import sweep
+
+# a checkout that another user compiled is used as it is: its build folder cannot be brought up to date
+for _finder in sys.meta_path:
+    if getattr(_finder, "rebuild_flag", False) and not os.access(getattr(_finder, "path", ""), os.W_OK):
+        _finder.rebuild_flag = False  # type: ignore[attr-defined]
 
 __all__ = [
     "Discretisation",

@@ -203,11 +203,11 @@ def judge(
 
     result = verdict()
     if record:
-        expected.write_text(json.dumps(acceptance.record(result), indent=1) + "\n")
+        expected.write_text(json.dumps(acceptance.record(result), indent=1) + "\n", encoding="utf-8")
         result = verdict()
     out.parent.mkdir(parents=True, exist_ok=True)
     stamp = provenance.stamp(sources=[p.name for p in (*(studies or []), manufactured, readings, extremes) if p])
-    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n")
+    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n", encoding="utf-8")
     typer.echo(
         f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
     )
@@ -244,8 +244,9 @@ def trade(
 
     if contest not in tradeoff.CONTESTS:
         raise SceneError(f"there is no contest '{contest}'; give one of {', '.join(tradeoff.CONTESTS)}")
+    _writable(out)
     rows = tradeoff.run(tradeoff.CONTESTS[contest], lambda line: typer.echo(line, err=True))
     from warmslip.studies.refinement_study import stamp
 
-    tables.write(_writable(out), rows, stamp(None, contest=contest))
+    tables.write(out, rows, stamp(None, contest=contest))
     typer.echo(f"{len(rows)} runs in {out}")

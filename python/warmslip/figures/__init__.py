@@ -44,6 +44,13 @@ KINDS = {
 }
 
 
+def _words(error: Exception) -> str:
+    """What is wrong with a table."""
+    if isinstance(error, KeyError):
+        return f"there is no column {error}"
+    return "there are too few rows" if isinstance(error, IndexError) else str(error)
+
+
 def draw(kind: str, inputs: list[Path], out: Path, contact: Callable[[Path], list[Any]] | None = None) -> None:
     """Draws `kind` from `inputs` into `out` (PNG), with its caption beside it as .rst.
 
@@ -63,5 +70,6 @@ def draw(kind: str, inputs: list[Path], out: Path, contact: Callable[[Path], lis
             figure, caption = drawing(given_to)
         except (LookupError, TypeError, ValueError) as error:
             given = ", ".join(str(path) for path in inputs)
-            raise ValueError(f"'{kind}' is drawn from {source}; {given} will not do ({error})") from error
+            reason = _words(error)
+            raise ValueError(f"'{kind}' is drawn from {source}; {given} will not do ({reason})") from error
         style.save(figure, caption, Path(out))

@@ -101,8 +101,10 @@ def grid_lines(axes: Any) -> None:
 
 
 def save(figure: Figure, caption: str, out: Path) -> None:
-    """Writes the PNG and its caption."""
+    """Writes the PNG and its caption. Raises ValueError for a name of another kind of file, OSError."""
+    if out.suffix != ".png":
+        raise ValueError(f"figures are PNG files; give a name that ends in .png in place of '{out.name}'")
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out, metadata={"Software": None})
     plt.close(figure)
-    out.with_suffix(".rst").write_text(caption.strip() + "\n")
+    out.with_suffix(".rst").write_text(caption.strip() + "\n", encoding="utf-8")

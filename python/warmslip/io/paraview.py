@@ -147,7 +147,9 @@ def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
     lines = [f'    <DataSet timestep="{time:.17g}" file="{name}"/>' for time, name in files]
     body = "\n".join(lines)
     path.write_text(
-        f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n'
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
+        f"  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n",
+        encoding="utf-8",
     )
 
 

@@ -13,7 +13,7 @@ Row = dict[str, Any]
 
 def texts(path: Path) -> list[dict[str, str]]:
     """The rows of a table as they are written, in order."""
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         return list(csv.DictReader(file))
 
 
@@ -38,12 +38,12 @@ def write(path: Path, rows: Iterable[Mapping[str, Any]], stamp: Mapping[str, Any
     if not table:
         raise ValueError(f"there is no row to write to {path}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(table[0])
         out.writerows([f"{v:.17g}" if isinstance(v, float) else v for v in row.values()] for row in table)
     if stamp is not None:
-        path.with_suffix(".json").write_text(json.dumps(stamp, indent=2) + "\n")
+        path.with_suffix(".json").write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
 
 
 def aligned(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> str:

@@ -62,19 +62,25 @@ def view(
             name = next(n for n in ("temperature", "von Mises stress", "displacement") if n in last.fields)
             states = [drawn.body(t, d, int(i)) for i in chosen]
             drawings.animation(states, name, factor, folder / "animation.gif", progress)
-            (folder / "animation.rst").write_text(f"{name} on the deformed body, {len(chosen)} states.\n")
+            (folder / "animation.rst").write_text(
+                f"{name} on the deformed body, {len(chosen)} states.\n", encoding="utf-8"
+            )
             files.append(folder / "animation.gif")
     page = folder / "report.html"
-    page.write_text(_page(Path(run), t.scene, functions, files))
+    page.write_text(_page(Path(run), t.scene, functions, files), encoding="utf-8")
     return [*files, page]
 
 
 def _page(run: Path, scene: dict[str, Any], functions: list[str], files: list[Path]) -> str:
     """The report; a run that was killed has no summary."""
     summary_file = run / "summary.json"
-    summary = json.loads(summary_file.read_text()) if summary_file.exists() else None
+    summary = json.loads(summary_file.read_text(encoding="utf-8")) if summary_file.exists() else None
     images = [
-        (base64.b64encode(path.read_bytes()).decode(), path.suffix[1:], path.with_suffix(".rst").read_text())
+        (
+            base64.b64encode(path.read_bytes()).decode(),
+            path.suffix[1:],
+            path.with_suffix(".rst").read_text(encoding="utf-8"),
+        )
         for path in files
     ]
     environment = jinja2.Environment(

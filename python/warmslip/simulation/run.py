@@ -70,7 +70,7 @@ class Result(Shown):
         """The result of a run that ended before, from its folder. Raises ValueError for a folder without one, OSError."""
         place = Path(folder)
         try:
-            found = json.loads((place / "summary.json").read_text())
+            found = json.loads((place / "summary.json").read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise ValueError(f"'{folder}' holds no summary.json; give the folder of a run that ended") from None
         except ValueError as error:
@@ -173,7 +173,7 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
         simulation.comm.rank == 0 and not simulation.discretisation.user_functions and (folder / "final.vtu").exists()
     ):  # else the disk was full
         try:
-            answer = json.loads((folder / "summary.json").read_text())
+            answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             stamp = answer["stamp"]
             same = (stamp["scene_hash"], stamp["fingerprint"]) == (simulation.scene.digest(), provenance.fingerprint())
             if answer["outcome"] == "completed" and same and not answer["functions"]:
@@ -208,6 +208,8 @@ def finish(simulation: Simulation, folder: Path | None) -> Result:
     answer = summary(simulation)
     u, w, theta = (simulation.discretisation.field(getattr(simulation.stepper, name)) for name in ("u", "w", "theta"))
     if folder is not None and simulation.comm.rank == 0:
-        _whole(folder / "summary.json", lambda path: path.write_text(json.dumps(answer, indent=2) + "\n"))
+        _whole(
+            folder / "summary.json", lambda path: path.write_text(json.dumps(answer, indent=2) + "\n", encoding="utf-8")
+        )
         _whole(folder / "final.vtu", lambda path: vtu.write_vtu(path, simulation.discretisation, u, w, theta))
     return Result(answer, u, w, theta, folder / "trajectory.h5" if folder is not None else None)

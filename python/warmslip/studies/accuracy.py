@@ -139,5 +139,5 @@ def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | N
     }
     summary = found.summary | {"error": known}
     if folder is not None and answer.simulation.comm.rank == 0:  # one rank has written it
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return replace(found, summary=summary)

@@ -235,7 +235,7 @@ def _stored(
         if list(rows[0])[1 : list(rows[0]).index("outcome")] != list(keys):
             raise SceneError(f"{path} is a sweep over other keys; give another folder")
         stamped = path.with_suffix(".json")
-        if stamped.exists() and json.loads(stamped.read_text()).get("scene_hash") != scene.digest():
+        if stamped.exists() and json.loads(stamped.read_text(encoding="utf-8")).get("scene_hash") != scene.digest():
             raise SceneError(f"{path} is a sweep of another scene; give another folder")
         for row in rows:
             one = digests.get(str(row["scene"]))

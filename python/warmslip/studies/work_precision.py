@@ -21,7 +21,7 @@ def named_parts(case: str) -> list[str] | None:
 def scene_of(path: Path) -> dict[str, Any]:
     """The resolved scene in the stamp of a study. Raises ValueError for a table without its stamp."""
     try:
-        return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
+        return dict(json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["scene"])
     except (FileNotFoundError, ValueError, LookupError, TypeError) as error:
         raise ValueError(f"'{path}' is no table of `warmslip study` with its stamp beside it; give one") from error
 
