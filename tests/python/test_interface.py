@@ -50,6 +50,29 @@ def test_states_are_read_in_the_loop(small: Small) -> None:
         _ = first.u
 
 
+def test_a_stored_state_is_the_one_of_the_loop(small: Small, tmp_path: Path) -> None:
+    seen = []
+    names = ("u", "w", "theta", "stress", "stress_zz", "mises", "nodal_stress")
+
+    def look(state: warmslip.State, _: object) -> None:
+        seen.append({name: getattr(state, name) for name in names} | {"pressure": state.contact_on().pressure})
+
+    warmslip.run(small(), out=tmp_path, observers=[look])
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        state, start = stored.state(0.51), stored.state(0.0)
+        assert stored.state().discretisation is state.discretisation
+    assert (state.step, state.time, start.step) == (2, 0.5, 0)
+    for name in names:
+        assert np.allclose(getattr(state, name), seen[1][name], rtol=1e-10, atol=1e-13), name
+    assert repr(state).startswith("<StoredState: step 2, t = 0.5, fields displacement, velocity, temperature")
+    with pytest.raises(ValueError, match="start of the run, where no contact forces"):
+        start.contact_on()
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        assert np.array_equal(stored.state(0.5).contact_on("bottom").pressure, seen[1]["pressure"])
+        with pytest.raises(ValueError, match="from t = 0 to 1, not at 2"):
+            stored.state(2.0)
+
+
 def test_observers_see_every_step(small: Small) -> None:
     seen: list[tuple[int, float, float]] = []
     done = warmslip.run(

@@ -12,7 +12,8 @@ from warmslip.figures import contact as contacts
 from warmslip.figures import run as drawings
 from warmslip.figures import style
 from warmslip.io import drawn
-from warmslip.io.paraview import opened, state_number
+from warmslip.io.paraview import opened
+from warmslip.io.trajectory import state_number
 
 FIELDS = {"displacement": "displacement", "mises": "von Mises stress", "temperature": "temperature"}
 
@@ -46,7 +47,7 @@ class Plot:
             raise ValueError(f"field: {field!r} is unknown; give one of {', '.join(FIELDS)}")
         with opened(self._folder) as t, style.applied():
             d = t.discretisation()
-            body, factor = drawn.body(t, d, state_number(t, time)), drawn.magnification(t, d)
+            body, factor = drawn.body(t, d, state_number(t.time, time)), drawn.magnification(t, d)
             name = FIELDS[field]
             if name not in body.fields:
                 there = ", ".join(key for key, words in FIELDS.items() if words in body.fields)

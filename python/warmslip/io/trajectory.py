@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from warmslip.io.stored_contact import StoredContact
+from warmslip.io.stored_state import StoredState
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
 from warmslip.messages import Shown, quoted
 from warmslip.model.contact_output import ContactFields
@@ -53,6 +54,15 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
     if data.nbytes > MAX_COMPRESSION * file.id.get_filesize():
         raise ValueError(f"{name} has more numbers than the file can hold")
     return tuple(data.shape)
+
+
+def state_number(times: Array, time: float | None) -> int:
+    """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
+    if time is None:
+        return len(times) - 1
+    if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
+        raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
+    return int(np.abs(times - time).argmin())
 
 
 class Trajectory(Shown):
@@ -244,6 +254,26 @@ class Trajectory(Shown):
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }
+
+    def state(self, time: float | None = None) -> StoredState:
+        """The stored state nearest to a time, the last one by default: u, w, theta, stresses, contact fields.
+
+        The scene is assembled once for all states, with the loads and laws that it states. Raises ValueError for a time beyond
+        the run, and as `discretisation`.
+        """
+        number = state_number(self.time, time)
+        u, w, theta = (None if one is None else np.asarray(one[number]) for one in (self.u, self.w, self.theta))
+        return StoredState(
+            self._assembled,
+            self._stored_contact,
+            step=self.step_of(number) + 1,
+            time=float(self.time[number]),
+            fields=(u, w, theta),
+        )
+
+    @cached_property
+    def _assembled(self) -> Discretisation:
+        return self.discretisation()
 
     def xarray(self) -> Any:
         """The run as an `xarray.Dataset`: states, contact fields of every step, and the series of steps and balances.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +14,48 @@ from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
 
-class State(Shown):
+class StressFields(Shown):
+    """Stresses of a state that has `discretisation`, `time` and `_straining`: u, w (nodes, d) and theta (nodes,), or None."""
+
+    discretisation: Discretisation
+    step: int
+    time: float
+
+    @property
+    def _straining(self) -> tuple[Any, Any, Any]:
+        raise NotImplementedError
+
+    def _facts(self) -> dict[str, str]:
+        problem, points = self.discretisation.problem, len(self.discretisation.surface.weights)
+        fields = ["displacement", "velocity"] * problem.moves + ["temperature"] * problem.conducts
+        contact = {"contact points": str(points)} if points else {}
+        return {"step": str(self.step), "t =": f"{self.time:g}", "fields": ", ".join(fields)} | contact
+
+    @cached_property
+    def stress(self) -> Array | None:
+        """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
+        return self._found(self.discretisation.stress)
+
+    @cached_property
+    def stress_zz(self) -> Array | None:
+        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
+        return self._found(self.discretisation.stress_zz)
+
+    @cached_property
+    def mises(self) -> Array | None:
+        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
+        return self._found(self.discretisation.mises_of)
+
+    @property
+    def nodal_stress(self) -> Array | None:
+        """Cauchy stress at the nodes, the mean of the cells around each, (nodes, d, d); see `Discretisation.nodal`."""
+        return None if self.stress is None else self.discretisation.nodal(self.stress)
+
+    def _found(self, of: Callable[..., Array]) -> Array | None:
+        return of(*self._straining) if self.discretisation.problem.moves else None
+
+
+class State(StressFields):
     """What a stepper holds after a step.
 
     Arrays are gathered when they are first read, on all ranks together (collective).
@@ -27,12 +69,6 @@ class State(Shown):
     def __init__(self, discretisation: Discretisation, stepper: Any, step: int) -> None:
         self.discretisation, self._stepper, self.step = discretisation, stepper, step
         self.time = float(stepper.time)
-
-    def _facts(self) -> dict[str, str]:
-        problem, points = self.discretisation.problem, len(self.discretisation.surface.weights)
-        fields = ["displacement", "velocity"] * problem.moves + ["temperature"] * problem.conducts
-        contact = {"contact points": str(points)} if points else {}
-        return {"step": str(self.step), "t =": f"{self.time:g}", "fields": ", ".join(fields)} | contact
 
     def _now(self) -> Any:
         if self._stepper.time != self.time:
@@ -54,32 +90,9 @@ class State(Shown):
         """Temperature, (nodes,); None without heat."""
         return self.discretisation.field(self._now().theta)
 
-    def _moving(self) -> Any:
-        return self._now().u
-
     @cached_property
     def _straining(self) -> tuple[Any, Any, Any]:
         return self.discretisation.straining(self._now())
-
-    @cached_property
-    def stress(self) -> Array | None:
-        """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
-        return None if self._moving() is None else self.discretisation.stress(*self._straining)
-
-    @cached_property
-    def stress_zz(self) -> Array | None:
-        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
-        return None if self._moving() is None else self.discretisation.stress_zz(*self._straining)
-
-    @cached_property
-    def mises(self) -> Array | None:
-        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
-        return None if self._moving() is None else self.discretisation.mises_of(*self._straining)
-
-    @property
-    def nodal_stress(self) -> Array | None:
-        """Cauchy stress at the nodes, the mean of the cells around each, (nodes, d, d); see `Discretisation.nodal`."""
-        return None if self.stress is None else self.discretisation.nodal(self.stress)
 
     @cached_property
     def contact(self) -> dict[str, Array]:

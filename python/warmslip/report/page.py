@@ -16,7 +16,8 @@ from warmslip.figures import run as drawings
 from warmslip.figures import style
 from warmslip.figures.error import error as error_bars
 from warmslip.io import drawn
-from warmslip.io.paraview import opened, state_number
+from warmslip.io.paraview import opened
+from warmslip.io.trajectory import state_number
 from warmslip.scene import plan
 from warmslip.scene.reader import build
 
@@ -41,7 +42,7 @@ def view(
     with opened(run) as t, style.applied():
         d, functions = t.discretisation(), t.functions
         folder.mkdir(parents=True, exist_ok=True)
-        here = state_number(t, at)
+        here = state_number(t.time, at)
         found: dict[str, tuple[Any, str]] = {}
         last = drawn.body(t, d, here)
         factor = drawn.magnification(t, d)
