@@ -12,6 +12,7 @@ import jinja2
 import numpy as np
 import tomli_w
 
+from warmslip.figures import contact as contacts
 from warmslip.figures import run as drawings
 from warmslip.figures import style
 from warmslip.figures.error import error as error_bars
@@ -35,8 +36,9 @@ def view(
     """Draws what the folder `run` of `warmslip run` holds into `out`: the files written.
 
     body.png (deformed, a panel a field) and contact.png at the stored state nearest to time `at` (default: the last one),
-    history.png, animation.gif of at most 40 states, and report.html, one page with all of it that needs no other file. Raises
-    ValueError for what holds no run, OSError for what cannot be written.
+    pressure.png and stick_slip.png along the contact parts of a body in the plane, history.png, animation.gif of at most 40
+    states, and report.html, one page with all of it that needs no other file. Raises ValueError for what holds no run, OSError
+    for what cannot be written.
     """
     folder = Path(out)
     with opened(run) as t, style.applied():
@@ -50,6 +52,9 @@ def view(
             found["body"] = drawings.bodies(last, factor)
         if parts := drawn.parts(t, here):
             found["contact"] = drawings.contact(parts, last.time)
+        if d.dim == 2 and t.contact_parts and len(t.series("steps")["time"]):
+            along = [drawn.line(t, part) for part in t.contact_parts]
+            found |= {"pressure": contacts.pressure(along), "stick_slip": contacts.stick_slip(along)}
         if len(t.series("steps")["time"]):
             found["history"] = drawings.history(t.series("steps")["time"], drawn.history(t, d))
         if (Path(run) / "error.csv").exists():
