@@ -35,6 +35,11 @@ def _check(file: h5py.File) -> None:
         if name in file["states"]:
             _shape(file, f"states/{name}", "f", None, *shape)
     points = _shape(file, "contact/weights", "f", None)[0]
+    for name, kind, size in (("positions", "f", (points, d)), ("normals", "f", (points, d)), ("part", "i", (points,))):
+        _shape(file, f"contact/{name}", kind, *size)
+    tables = json.loads(file.attrs["scene"]).get("contact") or []
+    if points and not 0 <= np.min(file["contact/part"]) <= np.max(file["contact/part"]) < len(np.atleast_1d(tables)):
+        raise ValueError("contact/part names contact tables that are not there")
     for name, (kind, *more) in CONTACT.items():
         if points or name in file["contact"]:
             _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))

@@ -50,8 +50,8 @@ def _barycentric(corners: Array, points: Array) -> Array:
 def arc_length(nodes: Array, edges: Any, points: Array) -> tuple[Array, Array]:
     """Arc length of points along a part of the plane, (points,), and the direction in which it grows there, (points, 2).
 
-    It is measured from the end of the line with the smallest x, of a closed line from its node with the smallest x. The lines
-    of a part of several pieces follow one another.
+    It is measured from the end of the line with the smallest x, of equal ones the smallest y; of a closed line from its node
+    with the smallest x. The lines of a part of several pieces follow one another.
     """
     length = _lengths(nodes, edges)
     nearest, shares = located(nodes, edges, points)

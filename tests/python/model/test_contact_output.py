@@ -115,6 +115,20 @@ def test_what_cannot_be_had_is_said_in_a_sentence(small: Small, tmp_path: Path) 
         stored.contact_history()
 
 
+@pytest.mark.parametrize("name", ["part", "positions", "normals"])
+def test_a_damaged_file_is_refused(name: str, small: Small, tmp_path: Path) -> None:
+    import h5py
+
+    warmslip.run(small(), out=tmp_path)
+    path = tmp_path / "trajectory.h5"
+    with h5py.File(path, "r+") as file:
+        values = np.asarray(file[f"contact/{name}"])
+        del file[f"contact/{name}"]
+        file[f"contact/{name}"] = values + 7 if name == "part" else values[:-1]
+    with pytest.raises(ValueError, match=f"damaged or no trajectory .*contact/{name}"):
+        warmslip.Trajectory(path)
+
+
 def test_of_several_parts_one_is_named(tmp_path: Path) -> None:
     parts = [{"part": part, "stiffness": 1e4} for part in ("bottom", "left")]
     warmslip.run(warmslip.load("two_materials").override(**{"time.steps": 2, "contact": parts}), out=tmp_path)
