@@ -30,8 +30,8 @@ def picture(folder: Path, out: Path) -> str:
     """Draws the end of a stored run; its caption."""
     from warmslip.figures import run as drawings
     from warmslip.figures import style
+    from warmslip.io.drawn import body, magnification
     from warmslip.io.trajectory import Trajectory
-    from warmslip.report.page import body, magnification
 
     with Trajectory(folder / "trajectory.h5") as stored, style.applied():
         d = stored.discretisation()

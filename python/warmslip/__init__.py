@@ -8,6 +8,8 @@ result = warmslip.run(scene, out="results/runs/first")
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +20,18 @@ from warmslip.scene.scene import Scene
 if TYPE_CHECKING:
     from warmslip.io.trajectory import Trajectory
     from warmslip.model.contact_laws import Law
-    from warmslip.model.discretisation import Discretisation, discretise
+    from warmslip.model.discretisation import Discretisation, discretise, von_mises
     from warmslip.model.loads import Loads
     from warmslip.model.state import State
     from warmslip.simulation.run import Result
     from warmslip.simulation.simulation import Simulation
     from warmslip.studies.accuracy import run
     from warmslip.studies.sweep import sweep
+
+# a checkout that another user compiled is used as it is: its build folder cannot be brought up to date
+for _finder in sys.meta_path:
+    if getattr(_finder, "rebuild_flag", False) and not os.access(getattr(_finder, "path", ""), os.W_OK):
+        _finder.rebuild_flag = False  # type: ignore[attr-defined]
 
 __all__ = [
     "Discretisation",
@@ -40,6 +47,7 @@ __all__ = [
     "load",
     "run",
     "sweep",
+    "von_mises",
 ]
 
 __version__ = metadata.version("warmslip")
@@ -56,6 +64,7 @@ _LAZY = {
     "State": "model.state",
     "Trajectory": "io.trajectory",
     "sweep": "studies.sweep",
+    "von_mises": "model.discretisation",
 }
 
 
@@ -65,3 +74,8 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     raise AttributeError(f"module 'warmslip' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """The public names, those included that are loaded when they are first needed."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

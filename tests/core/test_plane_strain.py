@@ -85,8 +85,8 @@ def test_every_region_has_its_own() -> None:
 
 def test_everything_that_is_written_counts_it(tmp_path: Path) -> None:
     """State, trajectory, VTU and the drawn body have one von Mises stress."""
+    from warmslip.io.drawn import body as drawn
     from warmslip.io.trajectory import Trajectory
-    from warmslip.report.page import body as drawn
 
     scene = build(
         {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import io
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +25,7 @@ def function(x: Any, t: Any = 0.0) -> Any:
 
 
 def test_about_a_dozen_names_all_keyword_only_but_the_first() -> None:
-    assert len(warmslip.__all__) == 13
+    assert len(warmslip.__all__) == 14
     for name in ("run", "discretise", "Simulation"):
         _, *more = [p for p in inspect.signature(getattr(warmslip, name)).parameters.values() if p.name != "self"]
         assert all(p.kind is p.KEYWORD_ONLY for p in more), name
@@ -49,6 +50,29 @@ def test_states_are_read_in_the_loop(small: Small) -> None:
         _ = first.u
 
 
+def test_a_stored_state_is_the_one_of_the_loop(small: Small, tmp_path: Path) -> None:
+    seen = []
+    names = ("u", "w", "theta", "stress", "stress_zz", "mises", "nodal_stress")
+
+    def look(state: warmslip.State, _: object) -> None:
+        seen.append({name: getattr(state, name) for name in names} | {"pressure": state.contact_on().pressure})
+
+    warmslip.run(small(), out=tmp_path, observers=[look])
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        state, start = stored.state(0.51), stored.state(0.0)
+        assert stored.state().discretisation is state.discretisation
+    assert (state.step, state.time, start.step) == (2, 0.5, 0)
+    for name in names:
+        assert np.allclose(getattr(state, name), seen[1][name], rtol=1e-10, atol=1e-13), name
+    assert repr(state).startswith("<StoredState: step 2, t = 0.5, fields displacement, velocity, temperature")
+    with pytest.raises(ValueError, match="start of the run, where no contact forces"):
+        start.contact_on()
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        assert np.array_equal(stored.state(0.5).contact_on("bottom").pressure, seen[1]["pressure"])
+        with pytest.raises(ValueError, match="from t = 0 to 1, not at 2"):
+            stored.state(2.0)
+
+
 def test_observers_see_every_step(small: Small) -> None:
     seen: list[tuple[int, float, float]] = []
     done = warmslip.run(
@@ -56,6 +80,29 @@ def test_observers_see_every_step(small: Small) -> None:
     )
     assert [step for step, *_ in seen] == [1, 2, 3, 4]
     assert seen[-1][1:] == (1.0, done.summary["contact"]["normal_force"])
+
+
+def test_stress_at_the_nodes_is_the_mean_of_the_cells_around(small: Small) -> None:
+    """Of a linear function at the centroids the mean over a symmetric patch is its value at the node; sums are kept."""
+    simulation = warmslip.Simulation(small())
+    d = simulation.discretisation
+    state, _ = next(simulation.steps())
+    x, cells = np.asarray(d.mesh.nodes), np.asarray(d.mesh.cells)
+    centroids = x[cells].mean(axis=1)
+    inner = np.flatnonzero((np.abs(x - 0.5) < 0.49).all(axis=1))
+    assert np.allclose(d.nodal(centroids)[inner], x[inner])
+    assert d.volumes.sum() == pytest.approx(1.0) and np.allclose(d.nodal(np.ones(len(cells))), 1.0)
+    corner = np.flatnonzero((x == [1.0, 0.0]).all(axis=1))
+    around = np.flatnonzero((cells == corner).any(axis=1))
+    assert np.allclose(state.nodal_stress[corner[0]], state.stress[around].mean(axis=0))
+    graded = warmslip.discretise(small(mesh__grading=[30.0, 1.0]))
+    values, node = np.arange(32.0), 12
+    around = (np.asarray(graded.mesh.cells) == node).any(axis=1)
+    expected = (graded.volumes * values)[around].sum() / graded.volumes[around].sum()
+    assert graded.nodal(values)[node] == pytest.approx(expected, rel=1e-12)
+    assert np.allclose(warmslip.von_mises(state.stress, state.stress_zz), state.mises)
+    with pytest.raises(ValueError, match=r"stress: the shape is \(32,\)"):
+        warmslip.von_mises(state.mises)
 
 
 def test_operators_and_factors_are_petsc_objects(small: Small) -> None:
@@ -72,9 +119,46 @@ def test_a_trajectory_as_xarray(small: Small, tmp_path: Path) -> None:
     done = warmslip.run(small(), out=tmp_path)
     with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
         data = stored.xarray()
-    assert dict(data.sizes) == {"time": 5, "node": 25, "axis": 2}
+        contact, steps = stored.contact_on(time=0.5), stored.series("steps")
+        balances = stored.series("balances")
+    assert dict(data.sizes) == {"time": 5, "node": 25, "axis": 2, "step": 4, "point": 5}
+    here = data.sel(step=0.5)
+    for name in ("pressure", "traction", "slip", "gap", "status", "friction_bound"):
+        assert np.array_equal(here[f"contact_{name}"], getattr(contact, name)), name
+    assert np.array_equal(here.arc_length, contact.arc_length) and set(here.part.values) == {"bottom"}
+    assert np.array_equal(data.normal_force, steps["normal_force"])
+    assert np.array_equal(data.balance_viscous, balances["viscous"])
+    total = float((here.contact_pressure * here.contact_weight).sum())
+    assert total == pytest.approx(float(here.normal_force), rel=1e-12)
     assert np.array_equal(data.u.isel(time=-1).values, done.u)
     assert float(data.theta.sel(time=1.0)[np.argmax(done.theta)]) == done.theta.max()
+
+
+@pytest.mark.parametrize("scene", ["heat_slab", "block_3d"])
+def test_of_any_run_an_xarray(scene: str, tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    keys = ["time.steps=2"] if scene == "heat_slab" else ["time.steps=2", "mesh.n=2"]
+    warmslip.run(warmslip.load(scene, keys), out=tmp_path)
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        data = stored.xarray()
+    assert ("contact_traction" in data) == (scene == "block_3d") and "arc_length" not in data
+    if scene == "block_3d":
+        assert data.contact_traction.dims == ("step", "point", "axis")
+
+
+@pytest.mark.parametrize("more", [{}, {"error": 0.3}])
+def test_progress_is_that_of_the_command(small: Small, monkeypatch: pytest.MonkeyPatch, more: dict[str, Any]) -> None:
+    from rich.console import Console
+
+    from warmslip.simulation import progress
+
+    screen = io.StringIO()
+    monkeypatch.setattr(progress, "console", Console(file=screen, force_terminal=True, width=120))
+    done = warmslip.run(small(), progress=True, **more)
+    assert f"{done.summary['steps']}/{done.summary['steps']}" in screen.getvalue() and "stick" in screen.getvalue()
+    before = len(screen.getvalue())
+    warmslip.run(small(), progress=False)
+    assert len(screen.getvalue()) == before
 
 
 def test_resultants_of_every_part(tmp_path: Path) -> None:

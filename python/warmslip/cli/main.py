@@ -14,9 +14,9 @@ import typer
 from rich.logging import RichHandler
 
 from warmslip.cli import scene, study, sweep, verify
-from warmslip.cli.options import console
 from warmslip.scene.errors import SceneError
 from warmslip.simulation import ranks
+from warmslip.simulation.progress import console
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 
@@ -42,7 +42,7 @@ def logged(
         level=log.upper(), format="%(message)s", handlers=[RichHandler(console=console, show_path=False)]
     )
     for noisy in ("matplotlib", "PIL", "h5py", "numexpr"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
+        logging.getLogger(noisy).setLevel(logging.ERROR)  # matplotlib warns of a cache that cannot be written
 
 
 # what a newcomer needs comes first in --help
@@ -78,6 +78,7 @@ for panel, commands in PANELS.items():
 
 def main() -> None:
     """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
+    os.environ.setdefault("MPLBACKEND", "Agg")  # files are drawn, and no window
     try:
         code = app(
             prog_name="warmslip", standalone_mode=False
@@ -129,7 +130,11 @@ def _explain(error: Exception) -> tuple[str, int]:
     """A sentence and an exit code: 2 for what the user can mend in the call, 1 for a run that failed."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         where = f" ({error.filename})" if error.filename else ""
-        return f"the disk is full{where}; make room, then go on from the last checkpoint with --resume", 1
+        running = "run" in sys.argv[1:]
+        cure = "then go on from the last checkpoint with --resume" if running else "and give the command again"
+        return f"the disk is full{where}; make room{',' * running} {cure}", 1
+    if isinstance(error, FileNotFoundError) and error.errno is None:  # of a reader, with the cure
+        return str(error), 2
     if isinstance(error, OSError):
         where = f" ({error.filename})" if error.filename else ""
         return f"cannot read or write a file{where}: {error.strerror or error}; check the path and its rights", 2

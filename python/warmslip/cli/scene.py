@@ -11,10 +11,11 @@ from typing import Annotated, Any
 
 import typer
 
-from warmslip.cli.options import SceneName, Set, console, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
+from warmslip.simulation.progress import console, progress_bar, stepping
 
 RunFolder = Annotated[Path, typer.Argument(help="the folder that `warmslip run` wrote")]
 
@@ -78,14 +79,7 @@ def run(
         checked = answer.scene
     for odd in plan.plan(checked).suspicious if rank == 0 else ():
         console.print(f"note: {odd}", highlight=False, soft_wrap=True, markup=False)
-    with progress_bar(rank) as bar:
-        task = bar.add_task("stepping", total=checked.clock.steps, note="")
-
-        def progress(step: int, steps: int, report: Any) -> None:
-            bar.update(
-                task, completed=step, total=steps, note=f"open {report.open} stick {report.stick} slip {report.slip}"
-            )
-
+    with stepping(checked.clock.steps, rank) as progress:
         result = run(checked, out=out, backend=backend, progress=progress, resume=resume)
     if answer is not None:
         _tell_error(result, answer, wanted, out, rank)
@@ -93,6 +87,7 @@ def run(
         _estimate(checked, out, rank)
     if rank == 0:
         typer.echo(f"{result.outcome}: {_ending(result.summary)}, see {out}/summary.json")
+        _tell_numbers(result.summary)
         for sentence in result.summary["warnings"]:
             console.print(f"warning: {sentence}", highlight=False, soft_wrap=True, markup=False)
     if not result.completed:
@@ -180,8 +175,24 @@ def _refuse_dashless(petsc: str) -> None:
 
 
 def _digits(found: dict[str, float]) -> str:
-    """How many digits of each field can be trusted."""
-    return "digits: " + ", ".join(f"{name.replace('_', ' ')} {int(value)}" for name, value in found.items())
+    from warmslip.simulation.summary import trusted_digits
+
+    return f"digits: {trusted_digits(found)}"
+
+
+def _tell_numbers(summary: dict[str, Any]) -> None:
+    """Prints the numbers of the last state, the body on one line and the contact on another."""
+    from warmslip.simulation.summary import numbers
+
+    found = {name: f"{name} {words}" for name, words in numbers(summary).items()}
+    if not summary["steps"]:
+        return
+    body = [
+        found.pop(name) for name in ("largest displacement", "largest von Mises stress", "temperature") if name in found
+    ]
+    typer.echo(f"  at t = {summary['time']:g}: {', '.join(body)}")
+    if found:
+        typer.echo(f"  contact: {', '.join(found.values())}")
 
 
 def _ending(summary: dict[str, Any]) -> str:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from warmslip.cli.options import SceneName, Set, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.figures import KINDS
 from warmslip.records import tables
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.full import full_model
+from warmslip.simulation.progress import progress_bar
 
 Csv = Annotated[Path, typer.Option(help="the CSV file to write; its stamp goes beside it as .json")]
 Tables = Annotated[list[Path], typer.Argument(help="tables written by `warmslip study`")]
@@ -78,6 +79,7 @@ def study(
         rows,
         refinement_study.stamp(checked, levels=levels, reference=reference, grid=grid, steps_per_level=steps_per_level),
     )
+    typer.echo(tables.aligned(rows, ("n", "steps", "h", "k", "e_u_V", "e_w_L2", "e_theta_L2", "cpu_seconds")))
 
 
 def manufactured(
@@ -134,8 +136,10 @@ def blocks(
         tables.write(explained, rows, refinement_study.stamp(None))
 
 
-def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path]) -> None:
-    """Writes a table made from other tables; ValueError when those are not what they should be."""
+def _derived(
+    out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[Path], shown: Sequence[str] = ()
+) -> None:
+    """Writes a table made from other tables and prints the columns `shown`; ValueError for tables that will not do."""
     from warmslip.records import provenance
 
     names = [p.name for p in sources]
@@ -144,20 +148,17 @@ def _derived(out: Path, make: Callable[[], list[dict[str, Any]]], sources: list[
     except (LookupError, TypeError, UnicodeDecodeError, ZeroDivisionError) as error:
         raise ValueError(f"{', '.join(names)}: not tables that `warmslip study` wrote ({error!r})") from error
     tables.write(out, rows, provenance.stamp(sources=names))
+    if shown:
+        typer.echo(tables.aligned(rows, shown))
 
 
 def rates(tables: Tables, out: Csv) -> None:
     """Observed, bias-corrected and expected orders of studies."""
     from warmslip.studies import rates as orders
+    from warmslip.studies.work_precision import scene_of
 
-    _derived(out, lambda: [row for path in tables for row in orders.table(path, _scene_of(path))], tables)
-
-
-def _scene_of(path: Path) -> dict[str, Any]:
-    try:
-        return dict(json.loads(path.with_suffix(".json").read_text())["scene"])
-    except (FileNotFoundError, ValueError, LookupError, TypeError) as error:
-        raise ValueError(f"'{path}' is no table of `warmslip study` with its stamp beside it; give one") from error
+    shown = ("case", "term", "h", "error", "observed", "corrected", "expected")
+    _derived(out, lambda: [row for path in tables for row in orders.table(path, scene_of(path))], tables, shown)
 
 
 def readings(tables: Tables, out: Csv) -> None:
@@ -171,7 +172,8 @@ def work(tables: Tables, out: Csv) -> None:
     """Work against precision of every run of studies, with the front."""
     from warmslip.studies import work_precision
 
-    _derived(out, lambda: work_precision.table(tables), tables)
+    shown = ("problem", "case", "coupling", "quadrature", "n", "steps", "error", "cpu_seconds", "front")
+    _derived(out, lambda: work_precision.table(tables), tables, shown)
 
 
 def judge(
@@ -201,11 +203,11 @@ def judge(
 
     result = verdict()
     if record:
-        expected.write_text(json.dumps(acceptance.record(result), indent=1) + "\n")
+        expected.write_text(json.dumps(acceptance.record(result), indent=1) + "\n", encoding="utf-8")
         result = verdict()
     out.parent.mkdir(parents=True, exist_ok=True)
     stamp = provenance.stamp(sources=[p.name for p in (*(studies or []), manufactured, readings, extremes) if p])
-    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n")
+    out.write_text(json.dumps(result | {"stamp": stamp}, indent=1) + "\n", encoding="utf-8")
     typer.echo(
         f"{'passed' if result['passed'] else 'FAILED'}: {result['checks'] - len(result['failed'])} of {result['checks']} checks"
     )
@@ -224,7 +226,13 @@ def draw(
     """Draw a figure from tables."""
     import warmslip.figures as figures
 
-    figures.draw(kind, inputs, out)
+    figures.draw(kind, inputs, out, _contact_parts)
+
+
+def _contact_parts(path: Path) -> list[Any]:
+    from warmslip.io import drawn  # the compiled core, which other figures do not need
+
+    return drawn.lines(path)
 
 
 def trade(
@@ -236,8 +244,9 @@ def trade(
 
     if contest not in tradeoff.CONTESTS:
         raise SceneError(f"there is no contest '{contest}'; give one of {', '.join(tradeoff.CONTESTS)}")
+    _writable(out)
     rows = tradeoff.run(tradeoff.CONTESTS[contest], lambda line: typer.echo(line, err=True))
     from warmslip.studies.refinement_study import stamp
 
-    tables.write(_writable(out), rows, stamp(None, contest=contest))
+    tables.write(out, rows, stamp(None, contest=contest))
     typer.echo(f"{len(rows)} runs in {out}")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from warmslip.cli.options import SceneName, Set, progress_bar
+from warmslip.cli.options import SceneName, Set
 from warmslip.scene import reader
 from warmslip.scene.errors import SceneError
 from warmslip.scene.overrides import parse
@@ -91,13 +91,7 @@ def sweep(
     if len(wanted) < len(vary):
         raise SceneError("--vary names a key twice; give all its values at once")
     whole = _part(part)
-    with progress_bar(MPI.COMM_WORLD.rank) as bar:
-        task = bar.add_task("running", total=None, note="")
-
-        def progress(done: int, runs: int, row: dict[str, Any]) -> None:
-            bar.update(task, completed=done, total=runs, note=row["outcome"])
-
-        rows = sweeps.sweep(checked, wanted, out=out, jobs=jobs, part=whole, progress=progress)
+    rows = sweeps.sweep(checked, wanted, out=out, jobs=jobs, part=whole, progress=True)
     if MPI.COMM_WORLD.rank != 0:
         return
     counts: dict[str, int] = {}

@@ -75,8 +75,14 @@ def report(
     """Put the checks of all topics into one report."""
     from warmslip.verification import report as writing
 
-    text, passed = writing.markdown(tables, figures or [], audits or [], faults)
-    out.write_text(text)
+    try:
+        text, passed = writing.markdown(tables, figures or [], audits or [], faults)
+    except (LookupError, TypeError) as error:
+        given = ", ".join(path.name for path in tables)
+        raise ValueError(
+            f"{given}: not tables of checks that `warmslip verify` wrote ({error!r}); give those"
+        ) from error
+    out.write_text(text, encoding="utf-8")
     typer.echo(f"{'passed' if passed else 'FAILED'}: read {out}")
     if fail and not passed:
         raise typer.Exit(1)

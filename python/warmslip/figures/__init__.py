@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Drawing = Callable[[list[Path]], "tuple[Figure, str]"]
+Drawing = Callable[[list[Any]], "tuple[Figure, str]"]
 
 
 # where each is drawn, and from what
@@ -22,11 +22,15 @@ KINDS = {
     "deformed": ("fields", "trajectories, a panel each"),
     "temperature": ("fields", "trajectories, a panel each"),
     "mises": ("fields", "trajectories, a panel each"),
+    "pressure": ("contact", "trajectories in the plane: pressure and friction traction along each contact part"),
+    "stick_slip": ("contact", "trajectories in the plane: the stick-slip map of each contact part"),
+    "friction": ("contact", "trajectories in the plane: friction force over displacement of each contact part"),
+    "contact_temperature": ("contact", "trajectories in the plane: temperature along each contact part"),
     "errors": ("convergence", "studies named READING_THETA_COUPLING.csv, a panel each"),
     "study": ("study", "any study, a panel each"),
     "error": ("error", "error.csv of a run with --estimate"),
     "sweep": ("sweep", "the table of a sweep"),
-    "corrected": ("convergence", "the table of rates, then studies it speaks of"),
+    "corrected": ("convergence", "the table of rates, then any studies it speaks of"),
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),
     "table": ("maps", "the table of readings"),
     "extremes": ("maps", "the table of extremes"),
@@ -40,9 +44,17 @@ KINDS = {
 }
 
 
-def draw(kind: str, inputs: list[Path], out: Path) -> None:
+def _words(error: Exception) -> str:
+    """What is wrong with a table."""
+    if isinstance(error, KeyError):
+        return f"there is no column {error}"
+    return "there are too few rows" if isinstance(error, IndexError) else str(error)
+
+
+def draw(kind: str, inputs: list[Path], out: Path, contact: Callable[[Path], list[Any]] | None = None) -> None:
     """Draws `kind` from `inputs` into `out` (PNG), with its caption beside it as .rst.
 
+    `contact` reads the contact parts of a trajectory, `figures.contact.ContactLine` each, for the kinds that draw them.
     Raises ValueError for an unknown kind and for inputs that it cannot be drawn from, OSError when one is missing.
     """
     from warmslip.figures import style
@@ -53,8 +65,11 @@ def draw(kind: str, inputs: list[Path], out: Path) -> None:
     drawing: Drawing = getattr(import_module(f"warmslip.figures.{module}"), kind)
     with style.applied():
         try:
-            figure, caption = drawing(list(inputs))
+            read = contact if module == "contact" else None
+            given_to = [part for path in inputs for part in read(path)] if read else list(inputs)
+            figure, caption = drawing(given_to)
         except (LookupError, TypeError, ValueError) as error:
             given = ", ".join(str(path) for path in inputs)
-            raise ValueError(f"'{kind}' is drawn from {source}; {given} will not do ({error})") from error
+            reason = _words(error)
+            raise ValueError(f"'{kind}' is drawn from {source}; {given} will not do ({reason})") from error
         style.save(figure, caption, Path(out))

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from warmslip.figures.style import GREY, INK, PALE, SUMS, TERMS, case, column, grid_lines, number
+from warmslip.figures.style import GREY, INK, PALE, SUMS, TERMS, case, column, grid_lines, named, number
 from warmslip.records import tables
 
 # the legible ticks of the paper's figure 5
 TICKS_X, TICKS_Y = (0.025, 0.05, 0.1), (5e-3, 1e-2, 5e-2, 1e-1, 1.5e-1)
+MIN_TICK_RATIO = 1.4  # of two sizes next to each other on an axis
 MORE_X, MORE_Y = (0.2, 0.5), (1e-5, 5e-5, 1e-4, 5e-4, 1e-3, 0.5, 1.0, 5.0)
 
 
@@ -108,47 +109,87 @@ def mean_order(table: list[dict[str, str]], name: str) -> float:
 def corrected(inputs: list[Path]) -> tuple[Figure, str]:
     """Observed and bias-corrected orders against the expected ones. Inputs: the rates, then the studies to show."""
     rates, studies = tables.texts(inputs[0]), inputs[1:]
+    if not studies:
+        raise ValueError("no study is named; give the table of rates and then the studies that it speaks of")
     figure, axes = plt.subplots(
-        1, len(studies), figsize=(3.9 * len(studies), 4.2), sharex=True, sharey=True, squeeze=False
+        1, len(studies), figsize=(max(3.9 * len(studies), 5.6), 4.2), sharex=True, sharey=True, squeeze=False
     )
-    message = []
+    message, shown = [], []
     for ax, path in zip(axes[0], studies, strict=True):
-        message.append(orders(ax, [line for line in rates if line["case"] == path.stem], case(path).theta))
-        ax.set(xlabel="$h = k$", title=case(path).panel)
+        own = [line for line in rates if line["case"] == path.stem]
+        if not own:
+            cases = ", ".join(dict.fromkeys(line["case"] for line in rates))
+            raise ValueError(f"the rates speak of {cases}, and not of {path.stem}")
+        name = named(path)
+        message.append(orders(ax, own, f"theta_F = {name.theta}" if name else path.stem))
+        shown += own
+        ax.set(xlabel="$h = k$" if name else "$h$, halved with $k$", title=name.panel if name else path.stem)
         grid_lines(ax)
     bottom, top = axes[0, 0].get_ylim()
     axes[0, 0].set(ylim=(min(bottom, 0), max(top, 1.5)), ylabel="order")
-    sizes = sorted({float(line["h"]) for line in rates if np.isfinite(float(line["observed"] or "nan"))})
+    sizes = sorted({float(line["h"]) for line in shown if np.isfinite(float(line["observed"] or "nan"))})
     axes[0, 0].set_xscale("log", base=2)
     axes[0, 0].set_xlim(sizes[0] / 1.3, sizes[-1] * 1.3)
-    axes[0, 0].xaxis.set_major_locator(FixedLocator(sizes))
-    axes[0, 0].xaxis.set_major_formatter(lambda value, _: f"1/{1 / value:.0f}")
-    names = [Line2D([], [], color=colour, marker=marker, label=label) for label, colour, marker in TERMS.values()]
+    axes[0, 0].xaxis.set_major_locator(FixedLocator(spread(sizes)))
+    axes[0, 0].xaxis.set_minor_locator(NullLocator())
+    axes[0, 0].xaxis.set_major_formatter(lambda value, _: f"1/{1 / value:.0f}" if value < 0.6 else number(value))
+    there = {line["term"] for line in shown if np.isfinite(float(line["observed"] or "nan"))}
+    names = [
+        Line2D([], [], color=colour, marker=marker, label=label)
+        for name, (label, colour, marker) in TERMS.items()
+        if name in there
+    ]
     kinds = [
         Line2D([], [], color=GREY, ls=":", marker="o", mfc="white", label="observed"),
         Line2D([], [], color=GREY, marker="o", label="bias removed"),
-        Line2D([], [], color=GREY, lw=4, alpha=0.35, label="expected"),
     ]
-    figure.legend(handles=[*names, *kinds], loc="outside lower center", ncols=6, columnspacing=1.1, handlelength=2)
-    head = (
-        f"Reading '{case(studies[0]).reading}': orders between successive h = k. Dotted: as observed against the "
-        "finest solution, which flatters the last ones; solid: with that bias removed; wide pale lines: the order "
-        "that the problem is expected to."
+    expected = any(np.isfinite(float(line["expected"] or "nan")) for line in shown)
+    if expected:
+        kinds.append(Line2D([], [], color=GREY, lw=4, alpha=0.35, label="expected"))
+    handles = [*names, *kinds]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=6 if len(studies) > 1 else 3,
+        columnspacing=1.1,
+        handlelength=2,
     )
+    name = named(studies[0])
+    reading = (
+        f"Reading '{name.reading}': orders between successive h = k" if name else "Orders between successive levels"
+    )
+    head = (
+        f"{reading}. Dotted: as observed against the "
+        "finest solution, which flatters the last ones; solid: with that bias removed"
+    )
+    head += "; wide pale lines: the order that the problem is expected to." if expected else "."
     return figure, " ".join([head, *message])
 
 
-def orders(ax: Any, lines: list[dict[str, str]], theta: str) -> str:
+def spread(sizes: list[float]) -> list[float]:
+    """Those of ascending sizes that are far enough apart for a tick each."""
+    chosen: list[float] = []
+    for size in reversed(sizes):
+        if not chosen or chosen[-1] / size > MIN_TICK_RATIO:
+            chosen.append(size)
+    return chosen
+
+
+def orders(ax: Any, lines: list[dict[str, str]], what: str) -> str:
     """Draws the orders of one study; returns its sentence for the caption."""
     parts = []
     for name, (_, colour, marker) in TERMS.items():
         own = sorted((line for line in lines if line["term"] == name), key=lambda line: -float(line["h"]))
+        if not np.isfinite(column(own, "observed")).any():  # a field that the scene does not have
+            continue
         h, expected = column(own, "h"), column(own, "expected")
         ax.plot(h, expected, color=colour, lw=5, alpha=0.25, solid_capstyle="butt")
         ax.plot(h, column(own, "observed"), color=colour, ls=":", marker=marker, mfc="white")
         ax.plot(h, column(own, "corrected"), color=colour, marker=marker, mec="white", mew=0.5)
-        last = own[-1]
-        parts.append(
-            f"{name} {float(last['observed']):.2f} / {float(last['corrected']):.2f} / {float(last['expected']):.2f}"
-        )
-    return f"For theta_F = {theta}, finest pair, observed / corrected / expected: {', '.join(parts)}."
+        last = [column(own, key)[-1] for key in ("observed", "corrected", "expected")]
+        known = last if np.isfinite(last[-1]) else last[:-1]
+        parts.append(f"{name} {' / '.join(f'{value:.2f}' for value in known)}")
+    words = (
+        "observed / corrected / expected" if np.isfinite(column(lines, "expected")).any() else "observed / corrected"
+    )
+    return f"For {what}, finest pair, {words}: {', '.join(parts)}."

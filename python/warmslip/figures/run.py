@@ -59,15 +59,18 @@ def outline(triangles: Any) -> Any:
     return found[count == 1]
 
 
-def panel(
-    figure: Figure, place: Any, body: Body, name: str, *, factor: float, norm: Normalize, bar: bool = True
-) -> None:
-    """The deformed body coloured by one of its fields."""
+def panel(figure: Figure, place: Any, body: Body, name: str, *, factor: float, norm: Normalize) -> Any:
+    """The deformed body coloured by one of its fields, on new axes, which are returned."""
+    ax = figure.add_subplot(place, projection="3d" if body.dim == 3 else None)
+    panel_on(figure, ax, body, name, factor=factor, norm=norm)
+    return ax
+
+
+def panel_on(figure: Any, ax: Any, body: Body, name: str, *, factor: float, norm: Normalize) -> None:
+    """As `panel`, on axes that are there."""
     values, moved = body.fields[name], body.nodes + factor * body.u
     colours = MAPS.get(name, cm.batlow)
-    ax: Any
     if body.dim == 3:
-        ax = figure.add_subplot(place, projection="3d")
         value = values if len(values) == len(body.triangles) else values[body.triangles].mean(axis=1)
         shade = colours(norm(value))
         faces = Poly3DCollection(moved[body.triangles], facecolors=shade, edgecolors=shade, linewidths=0.3)
@@ -77,7 +80,6 @@ def panel(
         ax.set_axis_off()
         ax.view_init(*_seen_from(body))
     else:
-        ax = figure.add_subplot(place)
         drawn: Any = {"cmap": colours, "norm": norm, "rasterized": True}
         if len(values) == len(body.triangles):
             ax.tripcolor(*moved.T, body.triangles, facecolors=values, **drawn)
@@ -95,9 +97,8 @@ def panel(
         ax.spines[:].set_visible(False)
         ax.tick_params(length=2, color=GREY, labelcolor=GREY)
     ax.set_title(name)
-    if bar:
-        extend = "max" if norm.vmax is not None and values.max() > norm.vmax else "neither"
-        figure.colorbar(plt.cm.ScalarMappable(norm, colours), ax=ax, shrink=0.75, pad=0.02, extend=extend)
+    extend = "max" if norm.vmax is not None and values.max() > norm.vmax else "neither"
+    figure.colorbar(plt.cm.ScalarMappable(norm, colours), ax=ax, shrink=0.75, pad=0.02, extend=extend)
 
 
 def _seen_from(body: Body) -> tuple[float, float]:
@@ -125,7 +126,7 @@ def legend_of_status(figure: Figure) -> None:
     figure.legend(handles=dots, loc="outside lower center", ncols=len(dots), handletextpad=0.1, columnspacing=1.5)
 
 
-def _height(body: Body, factor: float) -> float:
+def height(body: Body, factor: float) -> float:
     """Of a figure whose panels leave no empty bands above and below a flat body, inches."""
     if body.dim == 3:
         return 3.8
@@ -136,7 +137,7 @@ def _height(body: Body, factor: float) -> float:
 def bodies(body: Body, factor: float) -> tuple[Figure, str]:
     """The body, a panel a field."""
     names = list(body.fields)
-    figure = plt.figure(figsize=(WIDTHS[body.dim] * len(names), _height(body, factor)), layout="compressed")
+    figure = plt.figure(figsize=(WIDTHS[body.dim] * len(names), height(body, factor)), layout="compressed")
     magnified = f", displacement {factor:g} times magnified" if factor != 1 else ""
     figure.suptitle(f"t = {number(body.time)}{magnified}", fontsize=10)
     if len(body.points) and body.dim == 2:

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
-
-mpl.use("Agg")
-
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 INK, GREY, PALE = "#222222", "#8a8a8a", "#eeeeee"
 BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#a0528d", "#56b4e9"
+
+COUPLINGS = ("staggered", "lagged", "monolithic")
 
 # the terms of the theorem, their symbols and colours
 TERMS = {
@@ -62,13 +61,20 @@ class Case(NamedTuple):
         return rf"$\theta_F = {self.theta}$"
 
 
-def case(name: str | Path) -> Case:
+def named(name: str | Path) -> Case | None:
+    """What a file name READING_THETA_COUPLING says, None for another name."""
     words = Path(name).stem.split("_")
-    if len(words) not in (3, 4):
+    return Case(*words) if len(words) in (3, 4) and words[2] in COUPLINGS else None
+
+
+def case(name: str | Path) -> Case:
+    """As `named`. Raises ValueError for another name."""
+    found = named(name)
+    if found is None:
         raise ValueError(
             f"'{Path(name).stem}' is not called READING_THETA_COUPLING; `warmslip draw study` draws any study"
         )
-    return Case(*words)
+    return found
 
 
 def applied() -> AbstractContextManager[None]:
@@ -95,8 +101,10 @@ def grid_lines(axes: Any) -> None:
 
 
 def save(figure: Figure, caption: str, out: Path) -> None:
-    """Writes the PNG and its caption."""
+    """Writes the PNG and its caption. Raises ValueError for a name of another kind of file, OSError."""
+    if out.suffix != ".png":
+        raise ValueError(f"figures are PNG files; give a name that ends in .png in place of '{out.name}'")
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out, metadata={"Software": None})
     plt.close(figure)
-    out.with_suffix(".rst").write_text(caption.strip() + "\n")
+    out.with_suffix(".rst").write_text(caption.strip() + "\n", encoding="utf-8")

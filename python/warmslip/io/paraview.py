@@ -11,7 +11,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from warmslip.io.trajectory import Trajectory
+from warmslip.io.trajectory import Trajectory, state_number
 from warmslip.io.vtu import BODY, three, write_vtu
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import contact_fields, resultants
@@ -32,16 +32,6 @@ def opened(run: str | Path) -> Trajectory:
     if not path.exists():
         raise ValueError(f"'{run}' holds no trajectory.h5; give the folder that `warmslip run` wrote")
     return Trajectory(path)
-
-
-def state_number(t: Trajectory, time: float | None) -> int:
-    """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
-    times = t.time
-    if time is None:
-        return len(times) - 1
-    if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
-        raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
-    return int(np.abs(times - time).argmin())
 
 
 def contact_at(t: Trajectory, d: Discretisation, number: int) -> dict[str, Array]:
@@ -86,11 +76,11 @@ def export(
     folder = Path(out)
     with opened(run) as t:
         d = t.discretisation()
-        chosen = range(len(t.time)) if times is None else sorted({state_number(t, time) for time in times})
+        chosen = range(len(t.time)) if times is None else sorted({state_number(t.time, time) for time in times})
         if set(fields) != set(FIELDS):  # all that there are
             fields = _there(t, d, fields, warn)
         for time in times or []:
-            taken = float(t.time[state_number(t, time)])
+            taken = float(t.time[state_number(t.time, time)])
             if abs(taken - time) > 1e-9 * d.scene.time.end:
                 warn(f"no state is stored at t = {time:g}; the nearest, at t = {taken:g}, is taken")
         folder.mkdir(parents=True, exist_ok=True)
@@ -147,7 +137,9 @@ def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
     lines = [f'    <DataSet timestep="{time:.17g}" file="{name}"/>' for time, name in files]
     body = "\n".join(lines)
     path.write_text(
-        f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n'
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
+        f"  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n",
+        encoding="utf-8",
     )
 
 

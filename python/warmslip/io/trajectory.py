@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import tempfile
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import h5py
 import numpy as np
 
+from warmslip.io.stored_contact import StoredContact
+from warmslip.io.stored_state import StoredState
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
 from warmslip.mesh import files
+from warmslip.messages import Shown, quoted
+from warmslip.model.contact_output import ContactFields
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
@@ -36,6 +41,11 @@ def _check(file: h5py.File) -> None:
         if name in file["states"]:
             _shape(file, f"states/{name}", "f", None, *shape)
     points = _shape(file, "contact/weights", "f", None)[0]
+    for name, kind, size in (("positions", "f", (points, d)), ("normals", "f", (points, d)), ("part", "i", (points,))):
+        _shape(file, f"contact/{name}", kind, *size)
+    tables = json.loads(file.attrs["scene"]).get("contact") or []
+    if points and not 0 <= np.min(file["contact/part"]) <= np.max(file["contact/part"]) < len(np.atleast_1d(tables)):
+        raise ValueError("contact/part names contact tables that are not there")
     for name, (kind, *more) in CONTACT.items():
         if points or name in file["contact"]:
             _shape(file, f"contact/{name}", kind, None, points, *([d] if more else []))
@@ -57,7 +67,16 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
     return tuple(data.shape)
 
 
-class Trajectory:
+def state_number(times: Array, time: float | None) -> int:
+    """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
+    if time is None:
+        return len(times) - 1
+    if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
+        raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
+    return int(np.abs(times - time).argmin())
+
+
+class Trajectory(Shown):
     """Read access to a stored run.
 
     Fields are read when they are indexed; a field that the scene does not have is None. Use it in a `with` block.
@@ -101,6 +120,19 @@ class Trajectory:
         except Exception as error:  # HDF5's own errors come as KeyError, RuntimeError, OSError and more
             self._file.close()
             raise ValueError(f"'{path}' is damaged or no trajectory ({error}); {THE_FILE}") from None
+
+    def _facts(self) -> dict[str, str]:
+        facts = {"": quoted(self.scene.get("title", "")), "file": str(self.path)}
+        if not self._file:
+            return facts | {"state": "closed"}
+        there = [name for name in ("u", "w", "theta") if f"states/{name}" in self._file]
+        points = len(self._file["contact/weights"])
+        return facts | {
+            "steps": str(self._steps),
+            "states": f"{self._states} to t = {self.time[-1]:g}",
+            "fields": ", ".join(there),
+            "contact points": str(points),
+        }
 
     def _whole(self) -> tuple[int, int]:
         """Steps, and states of them, of which everything is there: a run that was killed may lack the last row of some series."""
@@ -165,6 +197,47 @@ class Trajectory:
             raise IndexError(f"there are {self._steps} steps, and none with the number {step}")
         return self._read[f"contact/{name}"][step % self._steps]
 
+    @cached_property
+    def _stored_contact(self) -> StoredContact:
+        return StoredContact(self._file, self.scene, self._steps, self._states, set(self.functions))
+
+    def contact_on(self, part: str | None = None, time: float | None = None) -> ContactFields:
+        """Contact fields of a part at the end of a step, ordered along it.
+
+        Parameters
+        ----------
+        part : str, optional
+            Name of a contact part; not needed where there is only one.
+        time : float, optional
+            The nearest step is taken; the last one by default.
+
+        Returns
+        -------
+        ContactFields
+            Arc length, pressure, friction traction and its bound, slip, gap, status; temperature where the state is stored.
+
+        Raises
+        ------
+        ValueError
+            For a part without contact points, a run without steps, and a time beyond the run.
+        """
+        self._read  # noqa: B018  it refuses once the file is closed
+        return self._stored_contact.near(part, time)
+
+    def contact_history(self, part: str | None = None) -> ContactFields:
+        """Contact fields of a part at the ends of all steps, as `contact_on`: arrays (steps, points).
+
+        Raises ValueError for a part without contact points and a run without steps.
+        """
+        self._read  # noqa: B018
+        return self._stored_contact.history(part)
+
+    @property
+    def contact_parts(self) -> list[str]:
+        """Names of the parts that have contact points."""
+        self._read  # noqa: B018
+        return list(self._stored_contact.points)
+
     def discretisation(self) -> Discretisation:
         """The scene assembled again on this process, with the loads and laws that it states.
 
@@ -203,26 +276,39 @@ class Trajectory:
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }
 
+    def state(self, time: float | None = None) -> StoredState:
+        """The stored state nearest to a time, the last one by default: u, w, theta, stresses, contact fields.
+
+        The scene is assembled once for all states, with the loads and laws that it states. Raises ValueError for a time beyond
+        the run, and as `discretisation`.
+        """
+        number = state_number(self.time, time)
+        u, w, theta = (None if one is None else np.asarray(one[number]) for one in (self.u, self.w, self.theta))
+        return StoredState(
+            self._assembled,
+            self._stored_contact,
+            step=self.step_of(number) + 1,
+            time=float(self.time[number]),
+            fields=(u, w, theta),
+        )
+
+    @cached_property
+    def _assembled(self) -> Discretisation:
+        return self.discretisation()
+
     def xarray(self) -> Any:
-        """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.
+        """The run as an `xarray.Dataset`: states, contact fields of every step, and the series of steps and balances.
+
+        The states u, w, theta are over time, node and axis, with positions x, y, z as coordinates of the nodes. The contact
+        fields, `contact_pressure` and so on, are over step and point, in the order of `contact_history`, with part and arc length
+        as coordinates of the points. The series are over step, the balances with the prefix `balance_`; `step` is the time at the
+        end of each.
 
         Raises RuntimeError when xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise RuntimeError("xarray is not installed; pip install xarray") from None
-        axes = list("xyz"[: self.nodes.shape[1]])
-        fields = {"u": ("time", "node", "axis"), "w": ("time", "node", "axis"), "theta": ("time", "node")}
-        return xarray.Dataset(
-            {
-                name: (dims, np.asarray(getattr(self, name)))
-                for name, dims in fields.items()
-                if getattr(self, name) is not None
-            },
-            {"time": self.time, "axis": axes, **{a: ("node", self.nodes[:, i]) for i, a in enumerate(axes)}},
-            {"title": self.scene.get("title", "")},
-        )
+        from warmslip.io.dataset import dataset
+
+        return dataset(self)
 
     def close(self) -> None:
         """Closes the file; a `with` block does."""

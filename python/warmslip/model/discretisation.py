@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from warmslip._core import Backend, ContactOptions, Coupling
 from warmslip._core import largest_strain as largest_principal_strain
 from warmslip._core import stress as cell_stress
 from warmslip._core import stress_out_of_plane as cell_stress_out_of_plane
-from warmslip.messages import quoted
+from warmslip.messages import Shown, quoted
 from warmslip.model.contact_laws import CheckedLaw, Law
 from warmslip.model.load_vectors import LoadVectors
 from warmslip.model.loads import Loads, data, evaluate
@@ -34,8 +35,8 @@ log = logging.getLogger(__name__)
 NEAR = 0.5  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with
 
 
-@dataclass(frozen=True)
-class Discretisation:
+@dataclass(frozen=True, repr=False)
+class Discretisation(Shown):
     """Everything of a scene that does not depend on the step size. Matrices are petsc4py objects (`operators.elasticity` ...)."""
 
     scene: Scene
@@ -52,6 +53,15 @@ class Discretisation:
     user_functions: list[str]  # what took the place of the scene's: "loads", "laws.PART.compliance"
     like: Any = None  # a stepper whose factors are those of this scene too
     known: dict[Any, Any] = field(default_factory=dict)  # what was found of mesh and operators, see `remember`
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            "": quoted(self.scene.title),
+            "nodes": str(len(self.mesh.nodes)),
+            "cells": str(len(self.mesh.cells)),
+            "unknowns": str(self.unknowns),
+            "contact points": str(len(self.surface.weights)),
+        }
 
     def remember(self, key: Any, find: Callable[[], Any]) -> Any:
         """What `find` finds, kept under a `key` for this discretisation and those that share its operators."""
@@ -147,6 +157,12 @@ class Discretisation:
                 out.append(values if same else interpolated(values, found.nodes, found.cells, x, NEAR))
         return out[0], out[1], out[2]
 
+    def law(self, part: str) -> Any:
+        """The `_core.ContactLaw` of a contact part."""
+        (contact,) = (one for one in self.scene.contacts if one.part == part)
+        own = (law for law in self.laws if law.functions[0].name.startswith(f"laws.{part}."))
+        return contact_part(contact, next(own, None)).law
+
     def restart(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
         """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made what is given on the supports.
 
@@ -199,6 +215,24 @@ class Discretisation:
     def _fields(self, u: Array | None, w: Array | None, theta: Array | None) -> tuple[Array, Array, Array]:
         none = np.empty((0, self.dim))
         return none if u is None else u, none if w is None else w, none[:, 0] if theta is None else theta
+
+    def nodal(self, values: Array) -> Array:
+        """Means of values of the cells (cells, ...) over the cells around each node, weighted by their volumes: (nodes, ...).
+
+        They smooth a jump between materials too.
+        """
+        cells = np.asarray(self.mesh.cells)
+        count, corners = cells.shape
+        around = np.repeat(self.volumes, corners), (cells.ravel(), np.repeat(np.arange(count), corners))
+        share = csr_array(around, shape=(len(self.mesh.nodes), count))
+        mean = (share @ values.reshape(count, -1)) / np.asarray(share.sum(axis=1))[:, None]
+        return np.asarray(mean.reshape(-1, *values.shape[1:]))
+
+    @property
+    def volumes(self) -> Array:
+        """Areas or volumes of the cells, (cells,)."""
+        x = np.asarray(self.mesh.nodes)[np.asarray(self.mesh.cells)]
+        return np.asarray(np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if self.dim == 2 else 6))
 
     def largest_strain(self, u: Array) -> float:
         """Largest principal strain, in size, of all cells for a nodal displacement (nodes, d); dimensionless."""
@@ -389,16 +423,32 @@ def _finished(
 def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
     """L2 norm and maximum of the von Mises stress of a stepper's state, at the cells' centroids (collective)."""
     mises = d.mises(stepper)
-    x = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells)]
-    volume = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / (2 if d.dim == 2 else 6)
+    volume = d.volumes
     return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
 
 
 def von_mises(stress: Array, zz: Array | None = None) -> Array:
-    """sqrt(3/2 s:s) with s the deviator of the stress (cells, d, d), as (cells,).
+    """Von Mises stress sqrt(3/2 s:s), with s the deviator of the stress.
 
-    Of a plane, `zz` (cells,) is the stress along z, 0 unless given, and its shear stresses along z are 0.
+    Parameters
+    ----------
+    stress : array (cells, d, d)
+        Cauchy stress, of cells or of nodes.
+    zz : array (cells,), optional
+        Stress along z of a body in the plane, 0 unless given. Shear stresses along z are 0.
+
+    Returns
+    -------
+    array (cells,)
+        Von Mises stress.
+
+    Raises
+    ------
+    ValueError
+        For stresses of another shape.
     """
+    if stress.ndim != 3 or stress.shape[1:] not in ((2, 2), (3, 3)):
+        raise ValueError(f"stress: the shape is {stress.shape}; give (cells, d, d) with d = 2 or 3")
     full = np.zeros((len(stress), 3, 3))
     d = stress.shape[1]
     full[:, :d, :d] = stress

@@ -2,16 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from warmslip.messages import Shown
+from warmslip.model.contact_output import ContactFields, PartPoints, chosen_part, contact_fields_on
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
 
-class State:
+class StressFields(Shown):
+    """Stresses of a state that has `discretisation`, `time` and `_straining`: u, w (nodes, d) and theta (nodes,), or None."""
+
+    discretisation: Discretisation
+    step: int
+    time: float
+
+    @property
+    def _straining(self) -> tuple[Any, Any, Any]:
+        raise NotImplementedError
+
+    def _facts(self) -> dict[str, str]:
+        problem, points = self.discretisation.problem, len(self.discretisation.surface.weights)
+        fields = ["displacement", "velocity"] * problem.moves + ["temperature"] * problem.conducts
+        contact = {"contact points": str(points)} if points else {}
+        return {"step": str(self.step), "t =": f"{self.time:g}", "fields": ", ".join(fields)} | contact
+
+    @cached_property
+    def stress(self) -> Array | None:
+        """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
+        return self._found(self.discretisation.stress)
+
+    @cached_property
+    def stress_zz(self) -> Array | None:
+        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
+        return self._found(self.discretisation.stress_zz)
+
+    @cached_property
+    def mises(self) -> Array | None:
+        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
+        return self._found(self.discretisation.mises_of)
+
+    @property
+    def nodal_stress(self) -> Array | None:
+        """Cauchy stress at the nodes, the mean of the cells around each, (nodes, d, d); see `Discretisation.nodal`."""
+        return None if self.stress is None else self.discretisation.nodal(self.stress)
+
+    def _found(self, of: Callable[..., Array]) -> Array | None:
+        return of(*self._straining) if self.discretisation.problem.moves else None
+
+
+class State(StressFields):
     """What a stepper holds after a step.
 
     Arrays are gathered when they are first read, on all ranks together (collective).
@@ -46,27 +90,9 @@ class State:
         """Temperature, (nodes,); None without heat."""
         return self.discretisation.field(self._now().theta)
 
-    def _moving(self) -> Any:
-        return self._now().u
-
     @cached_property
     def _straining(self) -> tuple[Any, Any, Any]:
         return self.discretisation.straining(self._now())
-
-    @cached_property
-    def stress(self) -> Array | None:
-        """Cauchy stress (2.1) of the cells, (cells, d, d); None when nothing moves."""
-        return None if self._moving() is None else self.discretisation.stress(*self._straining)
-
-    @cached_property
-    def stress_zz(self) -> Array | None:
-        """Stress of the cells along z, (cells,), of a body in the plane: 0 in plane stress. None when nothing moves."""
-        return None if self._moving() is None else self.discretisation.stress_zz(*self._straining)
-
-    @cached_property
-    def mises(self) -> Array | None:
-        """Von Mises stress of the cells, (cells,); it counts the stress along z."""
-        return None if self._moving() is None else self.discretisation.mises_of(*self._straining)
 
     @cached_property
     def contact(self) -> dict[str, Array]:
@@ -75,6 +101,53 @@ class State:
         force, moved = np.reshape(now.contact_force, shape), np.reshape(now.contact_displacement, shape)
         gap = self.discretisation.load_vectors.on_points("gap", self.time)
         return contact_fields(self.discretisation, force, moved, now.status, gap)
+
+    def contact_on(self, part: str | None = None) -> ContactFields:
+        """Contact fields of a part, ordered along it (collective).
+
+        Parameters
+        ----------
+        part : str, optional
+            Name of a contact part; not needed where there is only one.
+
+        Returns
+        -------
+        ContactFields
+            Arc length, pressure, friction traction and its bound, slip, gap, status, temperature.
+
+        Raises
+        ------
+        ValueError
+            For a part without contact points.
+        """
+        d, now = self.discretisation, self._now()
+        points, shape = part_points(d, part), (-1, d.dim)
+        return contact_fields_on(
+            points,
+            d.law(points.part),
+            time=self.time,
+            force=np.reshape(now.contact_force, shape),
+            displacement=np.reshape(now.contact_displacement, shape),
+            status=np.asarray(now.status),
+            gap=d.load_vectors.on_points("gap", self.time),
+            speed=points.speed(points.nodal(self.w)),
+            temperature=None if self.theta is None else points.nodal(self.theta),
+        )
+
+
+def part_points(d: Discretisation, part: str | None) -> PartPoints:
+    """The contact points of a part, of the only one for None. Raises ValueError for a part without contact points."""
+    numbers = np.asarray(d.surface.contacts, dtype=int)
+    names = [contact.part for contact in d.scene.contacts]
+    name = chosen_part(part, [names[i] for i in np.unique(numbers)])
+
+    def find() -> PartPoints:
+        surface, mesh = d.surface, d.mesh
+        x, normals, weights = (np.asarray(one) for one in (surface.positions, surface.normals, surface.weights))
+        on = numbers == names.index(name)
+        return PartPoints.of(name, np.asarray(mesh.nodes), np.asarray(mesh.parts[name]), x, normals, weights, on)
+
+    return d.remember(("points", name), find)  # type: ignore[no-any-return]
 
 
 def contact_fields(d: Discretisation, force: Array, displacement: Array, status: Any, gap: Array) -> dict[str, Array]:
@@ -92,6 +165,23 @@ def contact_fields(d: Discretisation, force: Array, displacement: Array, status:
         "slip": displacement - inwards[:, None] * normals,
         "status": np.asarray(status, dtype=float),
     }
+
+
+def largest_values(d: Discretisation, stepper: Any) -> dict[str, float]:
+    """The largest displacement (length), von Mises stress, temperature and contact pressure of a stepper's state, of the fields
+    that there are; also the lowest temperature. Collective."""
+    found: dict[str, float] = {}
+    if stepper.u is not None:
+        found["displacement"] = float(np.linalg.norm(d.field(stepper.u), axis=1).max())
+        found["von_mises"] = float(d.mises(stepper).max())
+    if stepper.theta is not None:
+        theta = d.field(stepper.theta)
+        found |= {"temperature": float(theta.max()), "lowest_temperature": float(theta.min())}
+    if len(d.surface.weights):
+        force = np.reshape(stepper.contact_force, (-1, d.dim))
+        pressing = np.sum(force * np.asarray(d.surface.normals), axis=1)
+        found["pressure"] = float((pressing / np.asarray(d.surface.weights)).max())
+    return found
 
 
 def resultants(d: Discretisation, force: Array) -> dict[str, Array]:

@@ -23,12 +23,16 @@ def validated(data: dict[str, Any], model: type[M]) -> M:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        # a union of types gives one error a member: the first tells what is wrong
-        first: dict[str, str] = {}
-        for e in error.errors():
-            where = _where(e, data)
-            first.setdefault(_key(where), _sentence(e, where, model))
-        raise SceneError("\n".join(first.values())) from None
+        raise refusal(error, data, model) from None
+
+
+def refusal(error: ValidationError, data: dict[str, Any], model: type[BaseModel]) -> SceneError:
+    """What is wrong with the data of a model, one sentence a problem."""
+    first: dict[str, str] = {}  # a union of types gives one error a member: the first tells what is wrong
+    for e in error.errors():
+        where = _where(e, data)
+        first.setdefault(_key(where), _sentence(e, where, model))
+    return SceneError("\n".join(first.values()))
 
 
 def _where(error: Any, data: Any) -> list[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from warmslip.mesh import files, measures
+from warmslip.messages import Shown
 from warmslip.scene import plausible_data
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import constant
@@ -14,8 +15,8 @@ from warmslip.scene.scene import Scene
 from warmslip.scene.validation import contact_keys, coupling_tables
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Shown):
     """What `explain` prints. Sentences name the keys of the scene; `removable` are keys whose removal changes no number."""
 
     mesh: list[str]  # sizes of a mesh file, its parts and regions
@@ -34,6 +35,19 @@ class Plan:
     output_seconds: float = 0.0  # opening and closing files, checkpoints
     seconds: float = 0.0
     memory_bytes: float = 0.0
+
+    def _facts(self) -> dict[str, str]:
+        counts = {
+            "operators": self.operators,
+            "could be left out": list(self.removable),
+            "not in the scene": self.missing,
+            "worth a second look": [*self.suspicious, *self.warnings],
+        }
+        cost = {"cost": f"{self.seconds:.2g} s"} if self.seconds > 0 else {}
+        return {"fields": "; ".join(self.fields)} | {name: str(len(rows)) for name, rows in counts.items()} | cost
+
+    def __str__(self) -> str:
+        return text(self)
 
 
 def _zero(value: Any) -> bool:

@@ -53,16 +53,13 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
         )
     path = Path(scene)
     if str(scene) in library():
-        text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text()
+        text = (resources.files("warmslip") / "scenes" / f"{scene}.toml").read_text(encoding="utf-8")
     else:
         try:
-            with path.open() as file:
+            with path.open(encoding="utf-8-sig") as file:  # some editors begin a file with a byte-order mark
                 text = file.read(MAX_SCENE_CHARS + 1)
         except (OSError, ValueError) as error:  # ValueError: bytes that are no text, or a null byte in the name
-            reason = error.strerror if isinstance(error, OSError) else "not a text file"
-            near = difflib.get_close_matches(str(scene), library(), 1)
-            hint = f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}"
-            raise SceneError(f"cannot read scene '{scene}' ({reason}); {hint}") from None
+            raise SceneError(f"cannot read scene '{scene}' {_unread(error, scene)}") from None
     if len(text) > MAX_SCENE_CHARS:
         raise SceneError(f"scene '{scene}' is longer than {MAX_SCENE_CHARS} characters; keep meshes and tables outside")
     if any(
@@ -93,6 +90,17 @@ def load(scene: str | Path, overrides: list[str] | None = None) -> Scene:
     if isinstance(initial, dict) and isinstance(initial.get("from"), str) and path.exists():
         initial["from"] = str(path.parent / initial["from"])
     return build(data)
+
+
+def _unread(error: Exception, scene: str | Path) -> str:
+    """Why a scene was not read, and what to do."""
+    if isinstance(error, UnicodeDecodeError):
+        return "(not a text file in UTF-8); save it in that encoding"
+    if isinstance(error, OSError) and not isinstance(error, FileNotFoundError):
+        return f"({error.strerror}); give a TOML file, and check its rights"
+    reason = error.strerror if isinstance(error, OSError) else "no file has that name"
+    near = difflib.get_close_matches(str(scene), library(), 1)
+    return f"({reason}); " + (f"did you mean '{near[0]}'?" if near else f"give a file or one of {', '.join(library())}")
 
 
 def _limit(error: Exception) -> str:

@@ -6,18 +6,40 @@ import hashlib
 import json
 from typing import Any, Self
 
-from pydantic import model_validator
+from pydantic import ValidationError, model_validator
 
 from warmslip.mesh import files
+from warmslip.messages import Shown, quoted
 from warmslip.scene import stored_state
-from warmslip.scene.errors import validated
+from warmslip.scene.errors import refusal, validated
 from warmslip.scene.overrides import replace
 from warmslip.scene.tables import SceneTables
 from warmslip.scene.validation import problems
 
 
-class Scene(SceneTables):
+class Scene(Shown, SceneTables):
     """A whole scene. Tables are blocks of the problem, and what is absent costs nothing; keys are those of the TOML file."""
+
+    def __init__(self, /, **tables: Any) -> None:
+        """Raises SceneError, one sentence a problem: unknown key, wrong type, value out of range."""
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise refusal(error, tables, type(self)) from None
+
+    def _facts(self) -> dict[str, str]:
+        mesh, time = self.mesh, self.time
+        size = f"refined {mesh.refine} times" if mesh.file is not None else f"{' x '.join(map(str, mesh.counts))} cells"
+        steps = f"{self.clock.steps} steps" if time.tolerance is None else f"steps with tolerance {time.tolerance:g}"
+        present = ("inertia", "elasticity", "viscosity", "heat")
+        parts = ", ".join(f"'{contact.part}'" for contact in self.contacts)
+        return {
+            "": quoted(self.title),
+            "mesh": f"{mesh.name}, {size}",
+            "time": f"{steps} to t = {time.end:g}",
+            "model": ", ".join(name for name in present if getattr(self, name) is not None),
+            **({"contact": f"on {parts}"} if parts else {}),
+        }
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

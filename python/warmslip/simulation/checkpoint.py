@@ -128,7 +128,7 @@ def _of_another_scene(folder: Path, scene: str) -> str:
     """What to say when the run that ended in the folder was of another scene: it would be overwritten."""
     path = folder / "summary.json"
     try:
-        there = json.loads(path.read_text())["stamp"]["scene_hash"]
+        there = json.loads(path.read_text(encoding="utf-8"))["stamp"]["scene_hash"]
     except (OSError, ValueError, LookupError, TypeError):
         return ""
     return "" if there == scene else f"{path} is of another scene"

@@ -8,13 +8,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warmslip.io import vtu
 from warmslip.io.trajectory import Trajectory
 from warmslip.io.trajectory_writer import TrajectoryWriter
+from warmslip.messages import Shown
 from warmslip.model.contact_laws import Law
 from warmslip.model.discretisation import refuse_types
 from warmslip.model.loads import Loads
@@ -24,13 +25,16 @@ from warmslip.scene.scene import Scene
 from warmslip.simulation import checkpoint
 from warmslip.simulation.signals import Interruption
 from warmslip.simulation.simulation import Simulation
-from warmslip.simulation.summary import summary
+from warmslip.simulation.summary import numbers, summary, trusted_digits
+
+if TYPE_CHECKING:
+    from warmslip.io.plot import Plot
 
 Observer = Callable[[State, Any], None]
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Shown):
     """The end of a run.
 
     Attributes
@@ -50,6 +54,39 @@ class Result:
     w: Any
     theta: Any
     trajectory: Path | None
+
+    def _facts(self) -> dict[str, str]:
+        found = self.summary
+        files = {"files": str(self.trajectory.parent)} if self.trajectory is not None else {}
+        return {
+            "": f"{self.outcome}, {found['steps']} steps to t = {found['time']:g}",
+            **numbers(found),
+            "trusted digits": trusted_digits(found["digits"]),
+            **files,
+        }
+
+    @classmethod
+    def read(cls, folder: str | Path) -> Result:
+        """The result of a run that ended before, from its folder. Raises ValueError for a folder without one, OSError."""
+        place = Path(folder)
+        try:
+            found = json.loads((place / "summary.json").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise ValueError(f"'{folder}' holds no summary.json; give the folder of a run that ended") from None
+        except ValueError as error:
+            raise ValueError(f"{place / 'summary.json'} is damaged ({error}); run the scene again") from None
+        with Trajectory(place / "trajectory.h5") as t:
+            u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
+        return cls(found, u, w, theta, place / "trajectory.h5")
+
+    @property
+    def plot(self) -> Plot:
+        """Figures of the run as matplotlib axes, see `Plot`. Raises ValueError for a run that was not stored."""
+        from warmslip.io.plot import Plot
+
+        if self.trajectory is None:
+            raise ValueError("the run was not stored, and figures are drawn from its files; run it with out=")
+        return Plot(self.trajectory.parent)
 
     @property
     def outcome(self) -> str:
@@ -160,7 +197,7 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
         simulation.comm.rank == 0 and not simulation.discretisation.user_functions and (folder / "final.vtu").exists()
     ):  # else the disk was full
         try:
-            answer = json.loads((folder / "summary.json").read_text())
+            answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             stamp = answer["stamp"]
             same = (stamp["scene_hash"], stamp["fingerprint"]) == (simulation.scene.digest(), provenance.fingerprint())
             if answer["outcome"] == "completed" and same and not answer["functions"]:
@@ -195,6 +232,8 @@ def finish(simulation: Simulation, folder: Path | None) -> Result:
     answer = summary(simulation)
     u, w, theta = (simulation.discretisation.field(getattr(simulation.stepper, name)) for name in ("u", "w", "theta"))
     if folder is not None and simulation.comm.rank == 0:
-        _whole(folder / "summary.json", lambda path: path.write_text(json.dumps(answer, indent=2) + "\n"))
+        _whole(
+            folder / "summary.json", lambda path: path.write_text(json.dumps(answer, indent=2) + "\n", encoding="utf-8")
+        )
         _whole(folder / "final.vtu", lambda path: vtu.write_vtu(path, simulation.discretisation, u, w, theta))
     return Result(answer, u, w, theta, folder / "trajectory.h5" if folder is not None else None)

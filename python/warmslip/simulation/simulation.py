@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from warmslip._core import Outcome
+from warmslip.messages import Shown, quoted
 from warmslip.model.contact_laws import Law
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.loads import Loads
@@ -31,7 +32,7 @@ PARTED = ("strained", "strained_w")  # u and w but for rigid motions, of a body 
 _fingerprint = cache(provenance.fingerprint)  # it reads every source, and this process has one code
 
 
-class Simulation:
+class Simulation(Shown):
     """A scene being stepped: iterate `steps()`, or let `warmslip.run` do it.
 
     Parameters
@@ -97,6 +98,16 @@ class Simulation:
         adaptive = isinstance(self.pace, AdaptivePace)
         self.local_error = LocalError(self.discretisation, self.stepper, scene.step) if adaptive else None
         log.info("%d unknowns on %d ranks; %s", self.discretisation.unknowns, self.comm.size, self.stepper.solver)
+
+    def _facts(self) -> dict[str, str]:
+        state = "under way" if self.outcome == "completed" and not self.finished else self.outcome
+        return {
+            "": quoted(self.scene.title),
+            "unknowns": str(self.discretisation.unknowns),
+            "steps": f"{self.taken} of {self.pace.expected}",
+            "t =": f"{self.stepper.time:g} of {self.scene.time.end:g}",
+            "state": state,
+        }
 
     @property
     def taken(self) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warmslip._core import compiler, petsc_version
-from warmslip.model.state import resultants
+from warmslip.model.state import largest_values, resultants
 from warmslip.records import provenance
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import digits
@@ -44,6 +44,7 @@ def summary(simulation: Simulation) -> dict[str, Any]:
         "functions": d.user_functions,
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
+        "largest": largest_values(d, s),
         "contact": contact | counts | {"traction": traction, "parts": parts},
         "balances": statistics.residuals,
         "digits": digits(statistics.trusted(s.extents)),
@@ -65,6 +66,31 @@ def summary(simulation: Simulation) -> dict[str, Any]:
             petsc_options=petsc_options(),
         ),
     }
+
+
+def numbers(summary: dict[str, Any]) -> dict[str, str]:
+    """The contents of summary.json in a few words: the largest fields of the last state, forces and shares of the contact."""
+    largest, contact = summary["largest"], summary["contact"]
+    points = sum(contact[name] for name in ("open", "stick", "slip"))
+    found: dict[str, str] = {}
+    for name, words in (("displacement", "largest displacement"), ("von_mises", "largest von Mises stress")):
+        if name in largest:
+            found[words] = f"{largest[name]:.3g}"
+    if "temperature" in largest:
+        found["temperature"] = f"{largest['lowest_temperature']:.3g} to {largest['temperature']:.3g}"
+    if points:
+        normal, friction = contact["normal_force"], contact["tangential_force"]
+        found["normal force"] = f"{normal:.3g}"
+        found["friction force"] = f"{friction if friction > 1e-12 * abs(normal) else 0.0:.3g}"
+        found["largest pressure"] = f"{largest['pressure']:.3g}"
+        shares = (f"{100 * contact[name] / points:.0f} % {name}" for name in ("open", "stick", "slip"))
+        found["contact points"] = f"{points} ({', '.join(shares)})"
+    return found
+
+
+def trusted_digits(found: dict[str, float]) -> str:
+    """How many digits of each field can be trusted."""
+    return ", ".join(f"{name.replace('_', ' ')} {int(value)}" for name, value in found.items())
 
 
 def petsc_options() -> dict[str, str]:

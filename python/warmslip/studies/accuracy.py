@@ -29,7 +29,7 @@ def run(
     laws: dict[str, Law] | None = None,
     backend: str = "automatic",
     observers: Sequence[Observer] = (),
-    progress: Callable[[int, int, Any], None] | None = None,
+    progress: Callable[[int, int, Any], None] | bool | None = None,
     resume: bool = False,
 ) -> Result:
     """Runs a scene to its end; with `error`, on a mesh and with steps that are chosen for it.
@@ -61,8 +61,9 @@ def run(
         Factorization: automatic, cholmod or petsc.
     observers : sequence of callables
         Called as `observer(state, report)` after every step, on every rank.
-    progress : callable, optional
+    progress : callable or bool, optional
         Called as `progress(step, steps, report)` after every step, on rank 0; with a tolerance, `steps` is what is expected.
+        True shows the bar of the command line, in a terminal and in a notebook with ipywidgets.
     resume : bool
         Continue from the newest whole checkpoint in `out`. On one process the end is bitwise that of an uninterrupted run; on
         several it agrees to round-off. Without a checkpoint the run starts from the beginning, unless the same run was
@@ -99,16 +100,29 @@ def run(
         "raises": True,
     }
     if error is None:
-        return plain.run(scene, **options)
+        return _shown(scene, options)
     for name, value in (("loads", loads), ("laws", laws), ("resume", resume)):
         if value:
             raise ValueError(f"{name}: a run with error= chooses from the scene's own data; leave it out")
     answer = ask.solve(scene, error, of, seconds=seconds)
-    if out is None and not observers and progress is None:
+    if out is None and not observers and not progress:
         found = plain.finish(answer.simulation, None)
     else:
-        found = plain.run(answer.scene, **options)
+        found = _shown(answer.scene, options)
     return with_error(found, answer, error, Path(out) if out is not None else None)
+
+
+def _shown(scene: Scene, options: dict[str, Any]) -> Result:
+    """Runs with plain options, and with a bar where `progress` is True."""
+    if options["progress"] is not True:
+        return plain.run(scene, **options | {"progress": options["progress"] or None})
+    from mpi4py import MPI
+
+    from warmslip.simulation.progress import stepping
+
+    rank = (options["comm"] or MPI.COMM_WORLD).rank
+    with stepping(scene.clock.steps, rank) as progress:
+        return plain.run(scene, **options | {"progress": progress})
 
 
 def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | None) -> Result:
@@ -126,5 +140,5 @@ def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | N
     }
     summary = found.summary | {"error": known}
     if folder is not None and answer.simulation.comm.rank == 0:  # one rank has written it
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return replace(found, summary=summary)

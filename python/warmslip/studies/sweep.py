@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from multiprocessing import get_context
@@ -142,7 +143,7 @@ def sweep(
     out: str | Path | None = None,
     jobs: int = 1,
     part: tuple[int, int] = (1, 1),
-    progress: Callable[[int, int, tables.Row], None] | None = None,
+    progress: Callable[[int, int, tables.Row], None] | bool | None = None,
 ) -> list[tables.Row]:
     """Runs a scene with every combination of some values of its keys.
 
@@ -162,8 +163,8 @@ def sweep(
     part : tuple of int
         (i, n): only the i-th of n equal parts, into a table of its own, for a cluster. A sweep without parts in the same folder
         takes their lines over.
-    progress : callable, optional
-        Called as ``progress(done, runs, row)``.
+    progress : callable or bool, optional
+        Called as ``progress(done, runs, row)``; True shows the bar of the command line.
 
     Returns
     -------
@@ -191,19 +192,34 @@ def sweep(
     todo = [one for one in mine if one.number not in found]
     writes = folder is not None and MPI.COMM_WORLD.rank == 0
     name = NAME if of == 1 else f"{NAME}.{i}of{of}"
-    for row in _rows(todo, jobs):
-        found[row["run"]] = row
-        if writes:
-            assert folder is not None
-            _write(folder / f"{name}.csv", found, others)
-        if progress:
-            progress(len(found), len(mine), row)
+    with _shown(progress) as tell:
+        for row in _rows(todo, jobs):
+            found[row["run"]] = row
+            if writes:
+                assert folder is not None
+                _write(folder / f"{name}.csv", found, others)
+            tell(len(found), len(mine), row)
     rows = [found[number] for number in sorted(found)]
     if writes and rows:
         assert folder is not None
         keys = {key: [_cell(value) for value in values] for key, values in vary.items()}
         tables.write(folder / f"{name}.csv", _joined(found, others), stamp(scene, vary=keys))
     return rows
+
+
+@contextmanager
+def _shown(progress: Callable[[int, int, tables.Row], None] | bool | None) -> Iterator[Callable[..., object]]:
+    """What is told of every run that ends: a function, or a bar."""
+    if callable(progress) or not progress:
+        yield progress or (lambda *_: None)
+        return
+    from mpi4py import MPI
+
+    from warmslip.simulation.progress import progress_bar
+
+    with progress_bar(MPI.COMM_WORLD.rank) as bar:
+        task = bar.add_task("running", total=None, note="")
+        yield lambda done, runs, row: bar.update(task, completed=done, total=runs, note=row["outcome"])
 
 
 def _joined(found: Mapping[int, tables.Row], others: Sequence[tables.Row]) -> list[tables.Row]:
@@ -235,7 +251,7 @@ def _stored(
         if list(rows[0])[1 : list(rows[0]).index("outcome")] != list(keys):
             raise SceneError(f"{path} is a sweep over other keys; give another folder")
         stamped = path.with_suffix(".json")
-        if stamped.exists() and json.loads(stamped.read_text()).get("scene_hash") != scene.digest():
+        if stamped.exists() and json.loads(stamped.read_text(encoding="utf-8")).get("scene_hash") != scene.digest():
             raise SceneError(f"{path} is a sweep of another scene; give another folder")
         for row in rows:
             one = digests.get(str(row["scene"]))

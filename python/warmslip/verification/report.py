@@ -101,7 +101,7 @@ def markdown(
 ) -> tuple[str, bool]:
     """The report and whether all checks passed; titles come from the stamps. Raises ValueError for a table without checks."""
     topics = {path.stem: tables.texts(path) for path in paths}
-    titles = {path.stem: json.loads(path.with_suffix(".json").read_text())["title"] for path in paths}
+    titles = {path.stem: json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["title"] for path in paths}
     empty = [name for name, rows in topics.items() if not rows]
     if empty:
         raise ValueError(f"no lines in {', '.join(empty)}: a verification that checks nothing proves nothing")
@@ -120,7 +120,9 @@ def markdown(
     ]
     for figure in figures:
         caption = figure.with_suffix(".rst")
-        out.append(f"\n![{figure.stem}]({figure.name})\n\n{caption.read_text().strip() if caption.exists() else ''}\n")
+        out.append(
+            f"\n![{figure.stem}]({figure.name})\n\n{caption.read_text(encoding='utf-8').strip() if caption.exists() else ''}\n"
+        )
     if audited:
         out += audits(audited)
     if seeded:

@@ -15,9 +15,9 @@ from support.processes import Command
 import warmslip
 from warmslip import Scene
 from warmslip.figures import run as drawings
+from warmslip.io import drawn
 from warmslip.io.paraview import opened
 from warmslip.report import page as view
-from warmslip.report.page import _along, body
 
 Small = Callable[..., Scene]
 KINDS = {
@@ -58,6 +58,7 @@ def test_every_kind_of_run_is_drawn(name: str, tmp_path: Path) -> None:
     expected = [
         "body.png",
         *(["contact.png"] if name != "heat_slab" else []),
+        *(["pressure.png", "stick_slip.png"] if name not in ("heat_slab", "block_with_hole") else []),
         "history.png",
         "animation.gif",
         "report.html",
@@ -80,9 +81,9 @@ def test_what_is_drawn_is_what_was_computed(small: Small, tmp_path: Path) -> Non
     done = warmslip.run(small(), out=tmp_path, observers=[lambda state, _: states.append((state.mises, state.contact))])
     with opened(tmp_path) as t:
         d = t.discretisation()
-        last = body(t, d, 4)
-        parts = view._parts(t, d, 4)
-        panels = view._history(t, d)
+        last = drawn.body(t, d, 4)
+        parts = drawn.parts(t, 4)
+        panels = drawn.history(t, d)
     assert np.array_equal(last.fields["temperature"], done.theta)
     assert np.allclose(last.fields["displacement"], np.linalg.norm(done.u, axis=1))
     mises, contact = states[-1]
@@ -107,16 +108,6 @@ def test_a_title_is_text_and_no_markup(small: Small, tmp_path: Path) -> None:
     assert "<script>" not in (tmp_path / "view" / "report.html").read_text()
 
 
-def test_length_along_lines_open_closed_and_several() -> None:
-    circle = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 13)[:-1]])
-    edges = np.array([[i, (i + 1) % 12] for i in range(12)])
-    side = 2 * np.sin(np.pi / 12)
-    assert np.allclose(np.sort(_along(circle, edges, circle)), side * np.arange(12))
-    path, two = np.array([[0.0, 0], [1, 0], [1, 1], [5, 5], [5, 6]]), np.array([[1, 0], [1, 2], [3, 4]])
-    middle = np.array([[0.5, 0.0], [1.0, 0.25], [5.0, 5.5]])
-    assert np.allclose(_along(path, two, middle), [0.5, 1.25, 2.5])
-
-
 def test_the_command_says_what_it_wrote_and_what_it_cannot(command: Command) -> None:
     keys = ["--set", "mesh.n=4", "--set", "time.steps=2", "--out", "run"]
     assert command("run", "paper_mixed", *keys).returncode == 0
@@ -137,7 +128,7 @@ def test_a_status_has_one_colour_in_every_figure(small: Small, tmp_path: Path) -
     warmslip.run(small(), out=tmp_path)
     with opened(tmp_path) as t:
         d = t.discretisation()
-        last, parts, history = body(t, d, 4), view._parts(t, d, 4), view._history(t, d)
+        last, parts, history = drawn.body(t, d, 4), drawn.parts(t, 4), drawn.history(t, d)
         display, output = drawings.bodies(last, 5.0)
         points, _ = drawings.contact(parts, 1.0)
         lines, _ = drawings.history(t.series("steps")["time"], history)

@@ -69,7 +69,9 @@ def write(path: Path, findings: Sequence[Finding], stamp: dict[str, Any]) -> Non
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".json":
         rows = [asdict(one) | {"values": {k: _plain(v) for k, v in one.values}} for one in findings]
-        path.write_text(json.dumps({"findings": rows, "stamp": stamp}, indent=2, allow_nan=False) + "\n")
+        path.write_text(
+            json.dumps({"findings": rows, "stamp": stamp}, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
         return
     joined = ["; ".join(f"{name} = {value:.17g}" for name, value in one.values) for one in findings]
     tables.write(path, (asdict(one) | {"values": text} for one, text in zip(findings, joined, strict=True)), stamp)
