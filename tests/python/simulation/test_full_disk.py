@@ -67,13 +67,13 @@ def test_a_disk_that_is_full_at_the_end_loses_nothing(tmp_path: Path, monkeypatc
         warmslip.run(one, out=tmp_path / "run")
     assert raised.value.filename == str(tmp_path / "run")  # what the command names in its sentence
     left = {path.name for path in (tmp_path / "run").iterdir()}
-    assert left == {"trajectory.h5", "summary.json", *(checkpoint.NAMES if every == 5 else ())}
+    assert left == {"trajectory.h5", "summary.json", checkpoint.END, *(checkpoint.NAMES if every == 5 else ())}
     same(tmp_path / "whole", tmp_path / "run")
     monkeypatch.undo()
     again = warmslip.run(one, out=tmp_path / "run", resume=True)
     assert again.completed and np.array_equal(again.u, whole.u)
     left = {path.name for path in (tmp_path / "run").iterdir()}
-    assert left == {"trajectory.h5", "summary.json", "final.vtu"}
+    assert left == {"trajectory.h5", "summary.json", "final.vtu", checkpoint.END}
     assert (tmp_path / "run" / "final.vtu").read_bytes() == (tmp_path / "whole" / "final.vtu").read_bytes()
 
 
