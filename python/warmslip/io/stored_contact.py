@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from warmslip.model.contact_output import ContactFields, PartPoints, chosen_part, contact_fields_on
+from warmslip.model.loads import data, evaluate
 from warmslip.model.materials import contact_part
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.typing import Array
@@ -73,7 +74,7 @@ class StoredContact:
             displacement=displacement,
             status=status,
             gap=gap,
-            speed=points.speed(self._velocities(points, displacement, steps)),
+            speed=points.speed(self._velocities(points, displacement, steps) - _drive(table, points, times)),
             temperature=self._temperatures(points, times),
         )
 
@@ -99,3 +100,11 @@ class StoredContact:
             if abs(stored[state] - time) <= SAME_TIME * stored[-1]:
                 found[row] = points.nodal(self._file["states/theta"][state])
         return found
+
+
+def _drive(table: ContactTable, points: PartPoints, times: Array) -> Array:
+    """Velocities of the foundation at the points of a part, (steps, points, d)."""
+    shape = points.positions.shape
+    if table.velocity is None:
+        return np.zeros((len(times), *shape))
+    return np.array([evaluate(data(table.velocity), points.positions, float(t), shape[1]) for t in times])

@@ -114,8 +114,8 @@ def leading_lame(scene: Scene, region: Any = None) -> tuple[float, float]:
 def corners(scene: Scene, mesh: Any) -> list[Corner]:
     """All corners of a plane body, or edges of one in space, on a mesh (`nodes`, `cells`, `parts`) of the scene.
 
-    Corners of interfaces between materials, vertices in space and the ends of the contact zone have exponents of their own,
-    which are not looked for.
+    Corners of interfaces between materials, vertices in space, the ends of the contact zone and corners of parts that are held in
+    some directions or on springs have exponents of their own, which are not looked for.
     """
     d = scene.mesh.dim
     nodes, cells = np.asarray(mesh.nodes), np.asarray(mesh.cells)
@@ -127,7 +127,8 @@ def corners(scene: Scene, mesh: Any) -> list[Corner]:
         for ridge in itertools.combinations(sorted(facet), d - 1):
             around.setdefault(ridge, []).append(i)
     openings = _openings(cells, nodes, set(around))
-    held, cooled_parts = set(scene.supports.displacement), set(scene.supports.temperature)
+    held, cooled_parts = set(scene.supports.clamped), set(scene.supports.temperature)
+    guided = set(scene.supports.guided) | set(scene.supports.springs or {})
     touching = {contact.part for contact in scene.contacts}
     rigid = {contact.part for contact in scene.contacts if contact.rigid}
     elastic: dict[Any, float] = {}
@@ -144,7 +145,7 @@ def corners(scene: Scene, mesh: Any) -> list[Corner]:
         region = _region(scene, mesh, int(owners[sides[0]]))
         lam, mu = leading_lame(scene, region)
         u = float("nan")
-        if scene.moves and mu > 0:
+        if scene.moves and mu > 0 and not guided.intersection(parts):
             stuck = tuple(c or part in rigid for c, part in zip(clamped, parts, strict=True))
             for fixed in {clamped, stuck}:
                 key = round(angle, 6), fixed, lam, mu

@@ -262,8 +262,12 @@ class LoadVectors:
             self._add((pair[0], pair[1]), mechanical, rule, data, t, what)
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
         velocity, temperature = self._support_velocity(t, step), self._support_temperature(t)
-        drive = self._on_points("foundation_velocity", t, self._dim).ravel() if self._drives else np.empty(0)
+        drive = self.drive(t).ravel() if self._drives else np.empty(0)
         return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation, drive)
+
+    def drive(self, t: float) -> Array:
+        """The velocity of the foundation at the contact points at time t, (points, d)."""
+        return self._on_points("foundation_velocity", t, self._dim)
 
 
 def _acts(data: Any) -> bool:

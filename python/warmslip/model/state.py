@@ -130,7 +130,7 @@ class State(StressFields):
             displacement=np.reshape(now.contact_displacement, shape),
             status=np.asarray(now.status),
             gap=d.load_vectors.on_points("gap", self.time),
-            speed=points.speed(points.nodal(self.w)),
+            speed=points.speed(points.nodal(self.w) - d.load_vectors.drive(self.time)[points.number]),
             temperature=None if self.theta is None else points.nodal(self.theta),
         )
 

@@ -94,6 +94,10 @@ def full_model(scene: Scene) -> FullScene:
     ]
     if scene.heat and scene.heat.expansion and scene.heat.expansion.reference_temperature != 0:
         problems.append("heat.expansion.reference_temperature: only 0 can be judged here; measure temperatures from it")
+    if scene.supports.points or scene.supports.springs:
+        problems.append("supports: only parts at zero can be judged here; leave points and springs out")
+    if scene.initial.run is not None:
+        problems.append("initial.from: only initial data of the scene can be judged here; leave the key out")
     if scene.regions:
         problems.append("regions: only one material can be judged here; leave the table out")
     if len(scene.contacts) != 1 or scene.contacts[0].stiffness is None:
@@ -102,6 +106,8 @@ def full_model(scene: Scene) -> FullScene:
         contact = scene.contacts[0]
         if contact.rigid or not contact.linear or contact.heats:
             problems.append("contact: only linear compliance with a constant conductance can be judged here")
+        if not isinstance(contact.gap, float | int | str) or contact.velocity is not None:
+            problems.append("contact: only a foundation at rest without a shape can be judged here")
         if contact.friction and contact.friction != FrictionTable(coefficient=contact.friction.coefficient):
             problems.append("contact.friction: only Coulomb's law with a constant coefficient can be judged here")
         data["contact"] = contact.model_dump(mode="json", exclude_none=True)

@@ -173,7 +173,11 @@ def plan(scene: Scene) -> Plan:
             for c in touching
             if c.friction is not None and c.friction.regularisation
         ]
+    steps += [
+        f"friction on '{c.part}' along the slip relative to its moving foundation" for c in touching if c.velocity
+    ]
     steps += _heat_by_contact(touching)
+    fields += _partial_supports(scene)
     return Plan(
         mesh=measures.lines(files.read(scene.mesh.file)) if scene.mesh.file is not None else [],
         fields=fields,
@@ -200,6 +204,23 @@ def _clock(scene: Scene) -> list[str]:
         f"{clock.steps} steps of {clock.shortest:.3g} to {clock.longest:.3g}, graded to t = {towards}: "
         f"{len(clock.sizes)} factorizations of each operator"
     ]
+
+
+def _partial_supports(scene: Scene) -> list[str]:
+    """What is held in some directions, and what is on springs."""
+    table, axes = scene.supports, "xyz"[: scene.mesh.dim]
+
+    def along(held: Any) -> str:
+        if not isinstance(held, list):
+            return "along its normal"
+        return "along " + " and ".join(axis for axis, value in zip(axes, held, strict=True) if value != "free")
+
+    out = [f"'{part}' is held {along(table.moved[part])}" for part in table.guided]
+    for point in table.points or []:
+        place = ", ".join(f"{x:g}" for x in point.at)
+        out.append(f"the node nearest to ({place}) is held {along(point.displacement or [0.0] * len(axes))}")
+    out += [f"'{part}' is on springs or dashpots" for part in table.springs or {}]
+    return out
 
 
 def _heat_by_contact(touching: list[ContactTable]) -> list[str]:

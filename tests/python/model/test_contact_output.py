@@ -138,3 +138,17 @@ def test_of_several_parts_one_is_named(tmp_path: Path) -> None:
             stored.contact_on()
         forces = [stored.contact_on(part).normal_force for part in stored.contact_parts]
         assert sum(forces) == pytest.approx(stored.series("steps")["normal_force"][-1], rel=1e-12)
+
+
+def test_the_friction_bound_on_a_belt_is_that_of_the_slip(tmp_path: Path) -> None:
+    """Friction that falls with the slip speed: on a moving foundation the bound of a slipping point is its traction."""
+    scene = warmslip.load("belt").override(
+        **{"mesh.n": [6, 3], "time.steps": 40, "contact.friction": {"coefficient": 0.3, "kinetic": 0.1, "speed": 0.1}}
+    )
+    result = warmslip.run(scene, out=tmp_path)
+    with warmslip.Trajectory(result.trajectory) as stored:
+        history = stored.contact_history("bottom")
+    slips = np.asarray(history.status) == 2
+    assert slips.sum() > 20
+    traction, bound = np.abs(history.traction[slips]), history.friction_bound[slips]
+    assert np.abs(traction - bound).max() <= 1e-9 * bound.max()
