@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, number
 
@@ -59,6 +59,38 @@ def outline(triangles: Any) -> Any:
     return found[count == 1]
 
 
+def creases(nodes: Array, triangles: Any, towards: Array, turn: float = 30.0) -> Any:
+    """Edges of a surface at which it turns by more than `turn` degrees and that are seen from a direction, (edges, 2)."""
+    corners = nodes[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    outwards = np.sum(normals * (corners.mean(axis=1) - nodes[triangles].mean(axis=(0, 1))), axis=1)
+    normals *= np.where(outwards < 0, -1.0, 1.0)[:, None]
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    order = np.lexsort(edges.T)
+    edges, faces = edges[order], np.tile(np.arange(len(triangles)), 3)[order]
+    first = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    one, other = normals[faces[first]], normals[faces[first + 1]]
+    sharp = np.sum(one * other, axis=1) < np.cos(np.radians(turn))
+    seen = np.maximum(one @ towards, other @ towards) > 0
+    return edges[first[sharp & seen]]
+
+
+def _directions(ax: Any, elevation: float, azimuth: float) -> None:
+    """Three arrows along the axes, seen from a direction (radians), in the lower left corner."""
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
+    for axis, name in enumerate("xyz"):
+        seen = 0.1 * np.array([right[axis], up[axis]])
+        start = np.array([0.06, 0.1])
+        arrow = {"arrowstyle": "-|>", "color": GREY, "lw": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
+        at = {"xycoords": "axes fraction", "textcoords": "axes fraction"}
+        ax.annotate("", start + seen, start, arrowprops=arrow, **at)
+        ax.annotate(
+            name, start + 1.35 * seen, start + 1.35 * seen, color=GREY, ha="center", va="center", fontsize=9, **at
+        )
+
+
 def panel(figure: Figure, place: Any, body: Body, name: str, *, factor: float, norm: Normalize) -> Any:
     """The deformed body coloured by one of its fields, on new axes, which are returned."""
     ax = figure.add_subplot(place, projection="3d" if body.dim == 3 else None)
@@ -75,10 +107,17 @@ def panel_on(figure: Any, ax: Any, body: Body, name: str, *, factor: float, norm
         shade = colours(norm(value))
         faces = Poly3DCollection(moved[body.triangles], facecolors=shade, edgecolors=shade, linewidths=0.3)
         ax.add_collection3d(faces)
+        elevation, azimuth = np.radians(_seen_from(body))
+        towards = np.array(
+            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        )
+        edges = creases(moved, body.triangles, towards)
+        ax.add_collection3d(Line3DCollection(moved[edges], colors=INK, linewidths=0.8, zorder=3))
         low, high = moved.min(axis=0), moved.max(axis=0)
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=high - low)
         ax.set_axis_off()
         ax.view_init(*_seen_from(body))
+        _directions(ax, elevation, azimuth)
     else:
         drawn: Any = {"cmap": colours, "norm": norm, "rasterized": True}
         if len(values) == len(body.triangles):
