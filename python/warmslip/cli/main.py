@@ -102,11 +102,10 @@ def main() -> None:
         if os.environ.get("WARMSLIP_DEBUG"):
             raise
         message, code = _explain(error)
-        _say(message, everywhere=True)
-        from mpi4py import MPI
-
-        if MPI.COMM_WORLD.size > 1:
+        if not ranks.others_come():  # this rank alone
+            _say(message, everywhere=True)
             ranks.abort(code)
+        _say(message, everywhere=False)
         sys.exit(code)
 
 

@@ -137,3 +137,29 @@ def test_a_cache_that_cannot_be_written_is_no_matter(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 2 and "MPLCONFIGDIR" not in done.stderr and done.stderr.count("\n") == 1
+
+
+@pytest.mark.mpi
+def test_what_all_ranks_refuse_is_said_once(tmp_path: Path) -> None:
+    call = [
+        "mpirun",
+        "-n",
+        "2",
+        sys.executable,
+        "-m",
+        "warmslip.cli.main",
+        "run",
+        "paper_mixed",
+        "--backend",
+        "cholmod",
+    ]
+    done = subprocess.run(
+        [*call, "--set", "mesh.n=4", "--out", str(tmp_path)],
+        env=child_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("error: the CHOLMOD backend needs one rank") == 1
+    assert "MPI_ABORT" not in done.stderr
