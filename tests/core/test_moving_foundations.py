@@ -52,9 +52,11 @@ def a_belt_and_a_thrown_block_are_one_motion(d: int) -> None:
             assert (
                 belt.stepper.cost.refinements <= thrown.stepper.cost.refinements + 2
             )  # else refinement mends what is wrong
-            assert np.abs(field(belt, "u") - field(thrown, "u") - 0.4 * speed).max() <= 1e-11
-            assert np.abs(field(belt, "theta") - field(thrown, "theta")).max() <= 1e-11
-            assert np.abs(forces_of(belt) - forces_of(thrown)).max() <= 1e-9 * np.abs(forces_of(belt)).max()
+            # forces of resting Gauss points are known to the tolerance of the law, 1e-12 of the largest terms
+            within = 1e-14 if quadrature == "nodal" else 1e-10
+            assert np.abs(field(belt, "u") - field(thrown, "u") - 0.4 * speed).max() <= within
+            assert np.abs(field(belt, "theta") - field(thrown, "theta")).max() <= within
+            assert np.abs(forces_of(belt) - forces_of(thrown)).max() <= 10 * within * np.abs(forces_of(belt)).max()
 
 
 @check
