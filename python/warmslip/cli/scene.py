@@ -269,9 +269,12 @@ def explain(
     else:
         from warmslip.model.materials import cell_regions
         from warmslip.model.meshes import make_mesh
+        from warmslip.model.probes import refuse_outside
 
         found = plan.plan(checked)
-        cell_regions(checked, make_mesh(checked))  # what else a run would refuse
+        mesh = make_mesh(checked)
+        cell_regions(checked, mesh)  # what else a run would refuse
+        refuse_outside(checked, mesh)
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plan.text(found))
 

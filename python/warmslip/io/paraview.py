@@ -11,6 +11,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from warmslip.io.part_series import write_table
 from warmslip.io.trajectory import Trajectory
 from warmslip.io.vtu import BODY, three, write_vtu
 from warmslip.model.discretisation import Discretisation
@@ -69,9 +70,11 @@ def export(
     body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
     contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
     `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
-    contact part, and the balances of every step. The files of an earlier series in `out` are removed. `say` is called with a
-    sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError for what
-    is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be written.
+    contact part, and the balances of every step. reactions.csv: force and moment of every support, resultants of the contact
+    parts and heat flows of every step, where there are any. The files of an earlier series in `out` are removed. `say` is called
+    with a sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError
+    for what is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be
+    written.
     """
     if isinstance(fields, str) or isinstance(times, str | float | int):
         name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
@@ -98,6 +101,7 @@ def export(
             if OWN.fullmatch(earlier.name):
                 earlier.unlink()
         _series(t, d, folder / "series.csv")
+        write_table(t, d, folder / "reactions.csv")
         files: list[tuple[float, str]] = []
         points: list[tuple[float, str]] = []
         for done, i in enumerate(chosen, start=1):

@@ -9,6 +9,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
+from warmslip.io import part_series
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.reader import build
@@ -40,6 +41,7 @@ def _check(file: h5py.File) -> None:
     for group, names in (("steps", REPORT), ("balances", BALANCES)):
         for name in {*file[group], *names} - (LATER - set(file[group])):
             _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
+    part_series.check(file, _shape)
 
 
 def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[int, ...]:
@@ -103,6 +105,7 @@ class Trajectory:
         file = self._file
         series = [data for group in ("steps", "balances") for data in file[group].values()]
         series += [file[f"contact/{name}"] for name in CONTACT if name in file["contact"]]
+        series += [file[name] for name in part_series.DATASETS if name in file]
         steps = min(len(data) for data in series)
         states = min(len(data) for data in file["states"].values())
         last = file["steps/time"][steps - 1] if steps else 0.0
@@ -184,11 +187,27 @@ class Trajectory:
         return list(json.loads(self._read.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
-        """Every dataset of `steps`, `balances` or `contact` as arrays."""
-        fixed = () if group in ("steps", "balances") else ("positions", "normals", "weights", "part")
+        """Every dataset of `steps`, `balances`, `contact`, `reactions` or `heat_flows` as arrays."""
+        fixed = ("positions", "normals", "weights", "part") if group == "contact" else ()
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }
+
+    @property
+    def reactions(self) -> dict[str, dict[str, Array]]:
+        """By support, in every step: `force` on the body, (steps, d), and `moment` about the origin, (steps, 1 or 3).
+
+        Empty without supports, and for files of earlier versions. Where supports meet, see `model.reactions.Reactions`.
+        """
+        found = part_series.names(self._read, "reactions")
+        series = self.series("reactions") if found else {}
+        return {name: {what: values[:, i] for what, values in series.items()} for i, name in enumerate(found)}
+
+    @property
+    def heat_flows(self) -> dict[str, Array]:
+        """Heat per time into the body in every step, (steps,): `exchange PART`, `friction PART`, `support PART`."""
+        found = part_series.names(self._read, "heat_flows")
+        return {name: self._read["heat_flows/flow"][: self._steps, i] for i, name in enumerate(found)}
 
     def xarray(self) -> Any:
         """The stored states as an `xarray.Dataset` (time, node, axis), with positions x, y, z as coordinates of the nodes.

@@ -18,6 +18,7 @@ from warmslip.figures.error import error as error_bars
 from warmslip.figures.run import Array, Body
 from warmslip.io.paraview import contact_at, opened, state_number
 from warmslip.io.trajectory import Trajectory
+from warmslip.model.arc_length import arc_length
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import resultants
 from warmslip.scene import plan
@@ -137,41 +138,14 @@ def _parts(t: Trajectory, d: Discretisation, number: int) -> dict[str, dict[str,
             fields[name] = values
         name = d.scene.contacts[part].part
         if d.dim == 2:
-            position = _along(np.asarray(d.mesh.nodes), np.asarray(d.mesh.parts[name]), x[on])
-            order = np.argsort(position)
+            position = arc_length(np.asarray(d.mesh.nodes), np.asarray(d.mesh.parts[name]), x[on])
+            order = np.argsort(position, kind="stable")
             fields = {key: values[order] for key, values in fields.items()} | {"position": position[order]}
         else:
             flat = np.argsort(-np.ptp(x[on], axis=0), kind="stable")[:2]
             fields["position"] = x[on][:, np.sort(flat)]
         found[name] = fields
     return found
-
-
-def _along(nodes: Array, edges: Any, points: Array) -> Array:
-    """Arc length of points on a line of edges, (points,)."""
-    joined: dict[int, list[int]] = {}
-    for a, b in edges.tolist():
-        joined.setdefault(a, []).append(b)
-        joined.setdefault(b, []).append(a)
-    length: dict[int, float] = {}
-    starts = sorted(joined, key=lambda node: (len(joined[node]), *nodes[node]))  # ends first, then any of a closed line
-    reached = 0.0
-    for start in starts:
-        node: int | None = start if start not in length else None
-        while node is not None:
-            length[node] = reached
-            onwards = next((other for other in joined[node] if other not in length), None)
-            if onwards is not None:
-                reached += float(np.linalg.norm(nodes[onwards] - nodes[node]))
-            node = onwards
-    a, b = nodes[edges[:, 0]], nodes[edges[:, 1]]
-    share = np.einsum("ped,ed->pe", points[:, None] - a, b - a) / np.sum((b - a) ** 2, axis=1)
-    share = np.clip(share, 0, 1)
-    away = np.linalg.norm(points[:, None] - (a + share[..., None] * (b - a)), axis=2)
-    nearest = away.argmin(axis=1)
-    at = share[np.arange(len(points)), nearest]
-    ends = np.array([[length[i] for i in edge] for edge in edges.tolist()])[nearest]
-    return np.asarray(ends[:, 0] + at * (ends[:, 1] - ends[:, 0]))
 
 
 def _history(t: Trajectory, d: Discretisation) -> dict[str, dict[str, Array]]:

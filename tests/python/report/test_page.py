@@ -16,8 +16,9 @@ import warmslip
 from warmslip import Scene
 from warmslip.figures import run as drawings
 from warmslip.io.paraview import opened
+from warmslip.model.arc_length import arc_length
 from warmslip.report import page as view
-from warmslip.report.page import _along, body
+from warmslip.report.page import body
 
 Small = Callable[..., Scene]
 KINDS = {
@@ -111,10 +112,10 @@ def test_length_along_lines_open_closed_and_several() -> None:
     circle = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 13)[:-1]])
     edges = np.array([[i, (i + 1) % 12] for i in range(12)])
     side = 2 * np.sin(np.pi / 12)
-    assert np.allclose(np.sort(_along(circle, edges, circle)), side * np.arange(12))
+    assert np.allclose(np.sort(arc_length(circle, edges, circle)), side * np.arange(12))
     path, two = np.array([[0.0, 0], [1, 0], [1, 1], [5, 5], [5, 6]]), np.array([[1, 0], [1, 2], [3, 4]])
     middle = np.array([[0.5, 0.0], [1.0, 0.25], [5.0, 5.5]])
-    assert np.allclose(_along(path, two, middle), [0.5, 1.25, 2.5])
+    assert np.allclose(arc_length(path, two, middle), [0.5, 1.25, 2.5])
 
 
 def test_the_command_says_what_it_wrote_and_what_it_cannot(command: Command) -> None:
