@@ -78,7 +78,7 @@ def loaded(d: int) -> Any:
             "friction": {"coefficient": 0.2},
             "quadrature": quadrature,
             "velocity": along(d, 0.0, 0.7),
-            "heat_exchange": {"conductance": 2.0, "per_pressure": 3.0, "foundation_temperature": "1 + x + t"},
+            "heat_exchange": {"conductance": 2.0, "per_pressure": 3.0, "foundation_temperature": "1 + x**2 + t"},
             "friction_heating": {"share": 0.6},
         },
     )

@@ -200,7 +200,7 @@ class Trajectory:
         Empty without supports, and for files of earlier versions. Where supports meet, see `model.reactions.Reactions`.
         """
         found = part_series.names(self._read, "reactions")
-        series = self.series("reactions") if found else {}
+        series = {what: self._read[f"reactions/{what}"][: self._steps] for what in ("force", "moment") if found}
         return {name: {what: values[:, i] for what, values in series.items()} for i, name in enumerate(found)}
 
     @property
