@@ -23,18 +23,20 @@ def load_kinks(d: Discretisation) -> list[str]:
     """A sentence for each load whose formula has a kink inside cells or facets that changes the load."""
     out = []
     for key, part, formula in _formulas(d):
-        inside = [switch for one in formula.components for switch in switches(one.text)]
+        inside = [s for one in formula.components for s in switches(one.text) if s.argument.names & {"x", "y", "z"}]
         if not inside:
             continue
         corners = np.asarray(d.mesh.nodes)[np.asarray(d.mesh.cells if part is None else d.mesh.parts[part])]
         times = np.linspace(0, d.scene.time.end, TIMES + 1) if of_time(formula) else np.zeros(1)
-        count, missed, largest = 0, 0.0, 0.0
-        for t in times:
-            crossed = np.logical_or.reduce([switch.inside(corners, float(t)) for switch in inside])
-            count = max(count, int(crossed.sum()))
-            off, load = _missed(formula, corners, crossed, float(t), d.loads.points)
-            missed, largest = max(missed, off), max(largest, load)
-        change = missed / largest if largest > 0 else 0.0
+        crossed = [np.logical_or.reduce([switch.inside(corners, float(t)) for switch in inside]) for t in times]
+        count = max(int(one.sum()) for one in crossed)
+        if not count:
+            continue
+        found = [
+            _missed(formula, corners, one, float(t), d.loads.points) for one, t in zip(crossed, times, strict=True)
+        ]
+        missed, largest = np.max(found, axis=0)
+        change = float(missed / largest) if largest > 0 else 0.0
         if change > LEAST:
             what = "cells" if part is None else "facets"
             out.append(plausibility.kinked(key, count, len(corners), what, d.loads.points, change))

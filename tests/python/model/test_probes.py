@@ -230,3 +230,33 @@ def test_drawings(tmp_path: Path) -> None:
     assert "line, 6 steps: displacement_x" in caption
     with pytest.raises(ValueError, match="'probe' is drawn from"):
         draw("probe", [tmp_path / "probe.rst"], tmp_path / "none.png")
+
+
+@pytest.mark.mpi
+def test_two_ranks_write_the_tables_of_one(command: Command, tmp_path: Path) -> None:
+    keys = [
+        "mesh.n=6",
+        "time.steps=3",
+        "contact.heat_exchange.foundation_temperature=10",
+        "output.probes={inner={at=[0.4,0.3]}, line={line=[[0.1,0.9],[0.7,0.1]],count=5}, edge={part='bottom'}}",
+    ]
+    options = [word for key in keys for word in ("--set", key)]
+    for ranks in (1, 2):
+        assert command("run", "paper_mixed", *options, "--out", f"run{ranks}", ranks=ranks).returncode == 0
+    for name, rows in (("inner", 3), ("line", 15), ("edge", 21)):
+        one, two = (table(tmp_path / f"run{ranks}", name) for ranks in (1, 2))
+        assert len(one) == len(two) == rows and one[0].keys() == two[0].keys()
+        for column in one[0]:
+            a, b = (np.array([row[column] for row in found]) for found in (one, two))
+            assert np.abs(a - b).max() <= 1e-11 * max(np.abs(a).max(), 1e-3), column
+    with (
+        warmslip.Trajectory(tmp_path / "run1/trajectory.h5") as first,
+        warmslip.Trajectory(tmp_path / "run2/trajectory.h5") as second,
+    ):
+        for what in ("force", "moment"):
+            a, b = (t.reactions["top"][what] for t in (first, second))
+            assert np.abs(a - b).max() <= 1e-11 * np.abs(a).max()
+        for name, a in first.heat_flows.items():
+            assert np.abs(a - second.heat_flows[name]).max() <= 1e-11 * max(np.abs(a).max(), 1e-3), name
+    refused = command("run", "paper_mixed", "--set", "output.probes.far.at=[0.5,1.5]", ranks=2)
+    assert refused.returncode != 0 and "at a distance of 0.5; correct the place" in refused.stderr
