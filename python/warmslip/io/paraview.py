@@ -67,17 +67,40 @@ def export(
     progress: Callable[[int, int], None] | None = None,
     warn: Callable[[str], None] = log.warning,
 ) -> int:
-    """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
+    """Writes a stored run for ParaView and as tables. The files of an earlier series in `out` are removed.
 
-    body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
-    contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; with the `form`
-    "vtkhdf" in place of "vtu" all states in body.vtkhdf and contact.vtkhdf; of these the
-    `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
-    contact part, and the balances of every step. reactions.csv: force and moment of every support, resultants of the contact
-    parts and heat flows of every step, where there are any. The files of an earlier series in `out` are removed. `say` is called
-    with a sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError
-    for what is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be
-    written.
+    Parameters
+    ----------
+    run : str or Path
+        The folder of `warmslip run`.
+    out : str or Path
+        The folder to write. With `form` "vtu": body.pvd with body_NNNN.vtu (displacement, velocity, temperature at the nodes;
+        stress and von Mises stress of the cells), contact.pvd with contact_NNNN.vtu (pressure, friction traction on the body,
+        gap, slip and status of the contact points). With "vtkhdf": all states in body.vtkhdf and contact.vtkhdf. In addition
+        series.csv (resultants, also of every contact part, and balances of every step), and reactions.csv (force and moment
+        of every support, resultants of the contact parts and heat flows of every step), where there are any.
+    fields : collection of str
+        The fields that are written; all by default.
+    times : sequence of float, optional
+        The stored states nearest to these times; all by default.
+    form : str
+        "vtu" or "vtkhdf".
+    progress : function, optional
+        Called with the numbers of states that are written and that there are.
+    warn : function
+        Called with a sentence for a chosen field that the run does not have, and for a time at which no state is stored.
+
+    Returns
+    -------
+    int
+        The number of states.
+
+    Raises
+    ------
+    ValueError
+        For what is no run, an unknown field or form, fields none of which the run has, or a time beyond the run.
+    OSError
+        When a file cannot be written.
     """
     if isinstance(fields, str) or isinstance(times, str | float | int):
         name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
