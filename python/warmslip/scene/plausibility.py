@@ -79,8 +79,8 @@ def inside(part: str, start: float, later: float, size: float) -> list[str]:
 def kinked(key: str, count: int, of: int, what: str, points: int, change: float) -> str:
     """Of a formula with a kink inside `count` of the cells or facets, and the share of the load that its quadrature misses."""
     return (
-        f"the formula of {key} has a kink or a jump inside {count} of {of} {what}, and {points} quadrature points per direction "
-        f"miss {100 * change:.2g} % of the load: let {what} end there, or raise loads.quadrature"
+        f"the formula of {key} has a kink or a jump inside {count} of {of} {what}, and a quadrature of {points} points per "
+        f"direction misses {100 * change:.2g} % of the load: let {what} end there, or raise loads.quadrature"
     )
 
 

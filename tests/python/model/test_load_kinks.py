@@ -77,9 +77,9 @@ def test_a_kink_inside_cells_is_said_with_its_size() -> None:
     missed = (5 / 18 - 1 / 5) / 4
     assert total(one)[1] == pytest.approx(5 * (0.3 + missed), rel=1e-13)
     assert message.startswith(
-        "the formula of loads.traction.top has a kink or a jump inside 1 of 4 facets, and 3 quadrature"
+        "the formula of loads.traction.top has a kink or a jump inside 1 of 4 facets, and a quadrature of 3 "
     )
-    stated = float(message.split(" miss ")[1].split(" %")[0])
+    stated = float(message.split(" misses ")[1].split(" %")[0])
     assert stated == pytest.approx(100 * missed / 0.3, rel=0.02)  # as a sum over the facet, and in two digits
     assert message in before(d) and message in warmslip.run(one).summary["warnings"]
     moving = body(body=[0.0, "max(0, x - 0.1 - 0.4 * t)"])
