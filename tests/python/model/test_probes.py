@@ -81,6 +81,27 @@ def test_values_at_points_and_on_lines(tmp_path: Path) -> None:
         assert row["temperature"] == pytest.approx(row["x"] + 2 * row["y"] + 1, rel=1e-13)
 
 
+@pytest.mark.parametrize("name", ["paper_mixed", "block_with_hole"])
+def test_stress_at_nodes_and_on_edges_is_the_mean_of_the_cells_there(name: str) -> None:
+    one = warmslip.load(name, ["mesh.n=4", "time.steps=1"] if name == "paper_mixed" else ["time.steps=1"])
+    mesh = make_mesh(one)
+    x, cells = np.asarray(mesh.nodes), np.asarray(mesh.cells)
+    inner = cells[7]
+    places = {"node": inner[:1], "edge": inner[:2], "cell": inner}
+    at = {key: {"at": x[nodes].mean(axis=0).tolist()} for key, nodes in places.items()}
+    simulation = Simulation(one.override(**{"output.probes": at}))
+    for state, _ in simulation.steps():
+        for probe, nodes in zip(probes(simulation.discretisation), places.values(), strict=True):
+            around = np.flatnonzero(np.isin(cells, nodes).sum(axis=1) == len(nodes))
+            edges = x[cells[around, 1:]] - x[cells[around, :1]]
+            volume = np.abs(np.linalg.det(edges))
+            found = probe.columns(state)
+            for column, values in (("stress_xy", state.stress[:, 0, 1]), ("von_mises", state.mises)):
+                exact = volume @ values[around] / volume.sum()
+                assert found[column][0] == pytest.approx(exact, rel=1e-12, abs=1e-14), (probe.name, column)
+            assert (len(around) == 1) == (probe.name == "cell")
+
+
 def test_a_contact_part_has_its_points_in_order(tmp_path: Path) -> None:
     one = square(
         {"edge": {"part": "bottom"}, "side": {"part": "right", "fields": ["temperature"]}},
