@@ -122,6 +122,14 @@ void bind(py::module_& m) {
           "reactions", [](const S& s) { return share(s.reactions()); },
           "Forces of the supports on the body at the nodes in the step that was evaluated last, force.")
       .def_property_readonly(
+          "support_heat", [](const S& s) { return share(s.support_heat()); },
+          "Heat per time from the supports of the temperature into the body at the nodes in that step; None without "
+          "heat.")
+      .def_property_readonly(
+          "contact_heat_flow", [](const S& s) { return s.contact_heat_flow(); },
+          "Heat per time at the contact points in that step, (points, 2): what pressure conducts into the foundation, "
+          "and what friction gives to the body. Empty where the contact does neither.")
+      .def_property_readonly(
           "contact_force", [](const S& s) { return s.contact_force(); }, "(d points), of the body on the foundation")
       .def_property_readonly(
           "contact_displacement", [](const S& s) { return s.level().contact_u; }, "(d points)")

@@ -49,7 +49,7 @@ def _kind(schema: dict[str, Any]) -> str:
             return "matrix"
         case "array":
             most, least = schema.get("maxItems"), schema.get("minItems")
-            count = f"{least} to {most} " if most != least else f"{most} " if most else ""
+            count = f"{least} to {most} " if most and most != least else f"{most} " if most else ""
             inner = _kind(schema["items"])
             return f"list of {count}({inner})" if " or " in inner else f"list of {count}{inner}"
         case "object":
@@ -71,7 +71,8 @@ def _tables() -> tuple[dict[str, Any], dict[str, list[str]]]:
 
     def walk(properties: dict[str, Any], where: str) -> None:
         for key, value in properties.items():
-            free = isinstance(value.get("additionalProperties"), dict) and "$ref" in value["additionalProperties"]
+            options = [value, *value.get("anyOf", [])]
+            free = any("$ref" in one["additionalProperties"] for one in options if one.get("additionalProperties"))
             for name in dict.fromkeys(re.findall(r"#/\$defs/(\w+)", json.dumps(value))):
                 place = f"{where}{key}" + (".NAME" if free else "")
                 places.setdefault(name, []).append(place)

@@ -1275,6 +1275,16 @@ class Stepper2:
         Forces of the supports on the body at the nodes in the step that was evaluated last, force.
         """
     @property
+    def support_heat(self) -> petsc4py.PETSc.Vec:
+        """
+        Heat per time from the supports of the temperature into the body at the nodes in that step; None without heat.
+        """
+    @property
+    def contact_heat_flow(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        Heat per time at the contact points in that step, (points, 2): what pressure conducts into the foundation, and what friction gives to the body. Empty where the contact does neither.
+        """
+    @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (d points)
@@ -1489,6 +1499,16 @@ class Stepper3:
     def reactions(self) -> petsc4py.PETSc.Vec:
         """
         Forces of the supports on the body at the nodes in the step that was evaluated last, force.
+        """
+    @property
+    def support_heat(self) -> petsc4py.PETSc.Vec:
+        """
+        Heat per time from the supports of the temperature into the body at the nodes in that step; None without heat.
+        """
+    @property
+    def contact_heat_flow(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        Heat per time at the contact points in that step, (points, 2): what pressure conducts into the foundation, and what friction gives to the body. Empty where the contact does neither.
         """
     @property
     def contact_displacement(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:

@@ -166,6 +166,8 @@ def trajectory(data: bytes) -> bool:
             for states in (t.u, t.w, t.theta):
                 assert states is None or states[:].shape[1] == len(t.nodes)
             assert len(t.time) >= 0 and t.cells.max() < len(t.nodes)
+            assert all(len(values) == len(t.series("steps")["time"]) for values in t.heat_flows.values())
+            assert all(force["force"].ndim == 2 for force in t.reactions.values())
             _stepped(t.discretisation().scene)
     except (ValueError, OSError) as error:
         return _refused(error)

@@ -34,6 +34,7 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   if (operators.springs) springs_ = layout.vector(d);
   if (operators.dashpots) dashpots_ = layout.vector(d);
   if (operators.conductivity) conducted_ = layout.vector(1);
+  if (operators.conductivity) support_heat_ = layout.vector(1);
   if (operators.exchange) exchanged_ = layout.vector(1);
   if (operators.conductivity && problem.contact_heats()) {
     contact_heat_ = layout.vector(1);

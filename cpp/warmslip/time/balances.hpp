@@ -28,6 +28,11 @@ class BalanceEvaluator {
                    Vec external = nullptr) const;
   /// Forces of the supports on the body at the nodes in the step that was evaluated last, zero where nothing is held.
   const VecHandle& reactions() const { return reactions_; }
+  /// Heat per time from the supports of the temperature into the body at the nodes, likewise; null without heat.
+  const VecHandle& support_heat() const { return support_heat_; }
+  /// Heat per time at the contact points in that step, (points, 2): what pressure conducts into the foundation, and
+  /// what friction gives to the body. Empty where the contact does neither.
+  const Eigen::MatrixX2d& contact_heat_flow() const { return contact_heat_flow_; }
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
   /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
   /// any, gets the same but for the inner terms, whose rounding moves no rigid body.
@@ -52,8 +57,9 @@ class BalanceEvaluator {
   const ContactSurface<d>& surface_;
   VecHandle viscous_w_, contact_force_, reactions_;     // B w, E lambda
   VecHandle springs_, dashpots_;                        // S u, S w of springs and dashpots
-  VecHandle conducted_, exchanged_;                     // D theta, J theta
+  VecHandle conducted_, exchanged_, support_heat_;      // D theta, J theta
   VecHandle contact_heat_, contact_heat_size_;          // heat that leaves at the contact points, and its magnitudes
+  Eigen::MatrixX2d contact_heat_flow_;                  // of the points, conducted and made by friction
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // hat functions at the contact points, found from positions
   struct RowSizes {
     double sum = 0, largest = 0;

@@ -125,6 +125,7 @@ void BalanceEvaluator<d>::contact_heat(const TimeLevel& after, const StepInputs&
                                        Balances& l) {
   const Eigen::VectorXd theta = at_points(after.theta);
   Eigen::VectorXd leaving = Eigen::VectorXd::Zero(surface_.points()), sizes = leaving;
+  contact_heat_flow_.resize(surface_.points(), 2);
   const double rest = 1e-12 * in.contact_free.cwiseAbs().maxCoeff();  // a slip below is rounding
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
     const ContactPart& part = problem_.contacts[surface_.contact(i)];
@@ -135,6 +136,7 @@ void BalanceEvaluator<d>::contact_heat(const TimeLevel& after, const StepInputs&
     l.exchanged += in.k * conducted * theta[i];
     l.friction_heating += in.k * made * theta[i];
     leaving[i] = conducted - made;
+    contact_heat_flow_.row(i) << conducted, made;
     sizes[i] =
         part.heat.per_pressure * std::max(force.dot(nu), 0.0) * (std::abs(theta[i]) + std::abs(in.foundation[i])) +
         std::abs(made);

@@ -32,7 +32,7 @@ void BalanceEvaluator<d>::heat(const TimeLevel& before, const TimeLevel& after, 
   const double carried = std::max(0.0, 1e-6 * std::max(after.sizes.w, before.sizes.w) - w);
   {
     Values t1(after.mass_theta), t0(before.mass_theta), q(in.heat), h(in.heating_w), flux(conducted_), x(exchanged_),
-        c(contact_heat_), sizes(contact_heat_size_), values(after.theta), old(before.theta);
+        c(contact_heat_), sizes(contact_heat_size_), values(after.theta), old(before.theta), given_there(support_heat_);
     const auto at = [](auto&& v, PetscInt i) { return v.size() ? v[i] : 0.0; };
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const double storage = ((*t1)[i] - (*t0)[i]) / in.k, supply = at(*q, i), heating = at(*h, i),
@@ -50,6 +50,7 @@ void BalanceEvaluator<d>::heat(const TimeLevel& before, const TimeLevel& after, 
             temperature_prescribed_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
       if (temperature_prescribed_[static_cast<std::size_t>(i)]) {
         l.support_heat += in.k * wall * (*values)[i];
+        (*given_there)[i] = wall;
       } else {
         raise(defect, std::abs(wall));
         if (magnitude > std::numeric_limits<double>::min()) raise(backward, std::abs(wall) / magnitude);

@@ -144,6 +144,10 @@ class Stepper {
   const FieldExtents& extents() const { return extents_; }
   /// Forces of the supports on the body in the last step, nodal; null without motion.
   const VecHandle& reactions() const { return evaluator_.reactions(); }
+  /// Heat per time from the supports of the temperature in the last step, nodal; null without heat.
+  const VecHandle& support_heat() const { return evaluator_.support_heat(); }
+  /// See BalanceEvaluator.
+  const Eigen::MatrixX2d& contact_heat_flow() const { return evaluator_.contact_heat_flow(); }
   const ContactSolver<d>* contact_solver() const {
     return systems_->contact.get();
   }                                                          ///< nullptr without contact points

@@ -216,6 +216,9 @@ def export(
     out: Annotated[Path, typer.Option(help="folder for body.pvd, contact.pvd and series.csv")],
     fields: Annotated[str, typer.Option(help="names, comma between: displacement,pressure; default all")] = "",
     times: Annotated[str, typer.Option(help="times, comma between, of the nearest stored states; default all")] = "",
+    form: Annotated[
+        str, typer.Option(help="vtu: a file for each state; vtkhdf: one file, for ParaView 5.12 and later")
+    ] = "vtu",
 ) -> None:
     """Write a stored run as a series that ParaView opens, and its resultants and balances as CSV."""
     from warmslip.io import paraview
@@ -228,13 +231,15 @@ def export(
             out,
             fields=names,
             times=_times(times),
+            form=form,
             progress=lambda n, total: bar.update(task, completed=n, total=total),
             warn=lambda words: console.print(f"note: {words}", highlight=False, soft_wrap=True, markup=False),
         )
-    body, points = ((out / f"{name}.pvd").exists() for name in ("body", "contact"))
-    where = f"{out}/body.pvd" if body else f"{out}/contact.pvd" if points else str(out)
+    end = "vtkhdf" if form == "vtkhdf" else "pvd"
+    body, points = ((out / f"{name}.{end}").exists() for name in ("body", "contact"))
+    where = f"{out}/body.{end}" if body else f"{out}/contact.{end}" if points else str(out)
     typer.echo(
-        f"{count} states in {where}{', contact points in contact.pvd' * (body and points)}, time series in series.csv"
+        f"{count} states in {where}{f', contact points in contact.{end}' * (body and points)}, time series in series.csv"
     )
 
 
@@ -280,9 +285,12 @@ def explain(
     else:
         from warmslip.model.materials import cell_regions
         from warmslip.model.meshes import make_mesh
+        from warmslip.model.probes import refuse_outside
 
         found = plan.plan(checked)
-        cell_regions(checked, make_mesh(checked))  # what else a run would refuse
+        mesh = make_mesh(checked)
+        cell_regions(checked, mesh)  # what else a run would refuse
+        refuse_outside(checked, mesh)
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plan.text(found))
 

@@ -29,6 +29,7 @@ KINDS = {
     "errors": ("convergence", "studies named READING_THETA_COUPLING.csv, a panel each"),
     "study": ("study", "any study, a panel each"),
     "error": ("error", "error.csv of a run with --estimate"),
+    "probe": ("probe", "probes/NAME.csv of a run, a row of panels each"),
     "sweep": ("sweep", "the table of a sweep"),
     "corrected": ("convergence", "the table of rates, then any studies it speaks of"),
     "grid": ("maps", "full-grid studies named READING_THETA_COUPLING.csv"),

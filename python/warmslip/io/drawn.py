@@ -11,6 +11,7 @@ from warmslip.figures import run as drawings
 from warmslip.figures.contact import ContactLine
 from warmslip.figures.run import Array, Body
 from warmslip.io.paraview import contact_at
+from warmslip.io.part_series import columns
 from warmslip.io.trajectory import Trajectory
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import resultants
@@ -127,8 +128,20 @@ def history(t: Trajectory, d: Discretisation) -> dict[str, dict[str, Array]]:
             name.replace("_", " "): values for name, values in forces.items() if np.abs(values).max() > 1e-12 * largest
         }
         panels["contact points"] = {name: steps[name] for name in ("open", "stick", "slip")}
+    panels |= _of_parts(t)
     panels["energy"] = chosen(ENERGIES)
     panels["work lost since the start"] = chosen(LOSSES, total=True)
     panels["heat since the start, tested with the temperature"] = chosen(HEATS, total=True)
     panels["residuals"] = chosen(RESIDUALS)
     return {title: series for title, series in panels.items() if series}
+
+
+def _of_parts(t: Trajectory) -> dict[str, dict[str, Array]]:
+    """Forces of the supports and heat flows of the parts, those that are not 0."""
+    series = columns(t.reactions, t.heat_flows)
+    panels = {}
+    for title, start in (("forces of supports", "force_"), ("heat into the body, per time", "heat ")):
+        lines = {name.removeprefix(start): values for name, values in series.items() if name.startswith(start)}
+        largest = max((float(np.abs(values).max(initial=0.0)) for values in lines.values()), default=0.0)
+        panels[title] = {name: v for name, v in lines.items() if np.abs(v).max(initial=0.0) > 1e-12 * largest}
+    return panels

@@ -8,11 +8,12 @@ import re
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-import meshio
 import numpy as np
 
+from warmslip.io.paraview_files import HdfSeries, VtuSeries
+from warmslip.io.part_series import write_table
 from warmslip.io.trajectory import Trajectory, state_number
-from warmslip.io.vtu import BODY, three, write_vtu
+from warmslip.io.vtu import BODY, body_fields, three
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import contact_fields, resultants
 from warmslip.records import tables
@@ -20,10 +21,11 @@ from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
 
-OWN = re.compile(r"(body|contact)(_\d{4,}\.vtu|\.pvd)")  # the files of a series
+OWN = re.compile(r"(body|contact)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)")  # the files of a series
 STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
 CONTACT = ("pressure", "friction traction", "gap", "slip", "status")
 FIELDS = (*BODY, *CONTACT)
+FORMS = ("vtu", "vtkhdf")
 
 
 def opened(run: str | Path) -> Trajectory:
@@ -51,21 +53,50 @@ def export(
     *,
     fields: Collection[str] = FIELDS,
     times: Sequence[float] | None = None,
+    form: str = "vtu",
     progress: Callable[[int, int], None] | None = None,
     warn: Callable[[str], None] = log.warning,
 ) -> int:
-    """Writes what the folder `run` of `warmslip run` holds to the folder `out`: the number of states.
+    """Writes a stored run for ParaView and as tables. The files of an earlier series in `out` are removed.
 
-    body.pvd and body_NNNN.vtu: displacement, velocity, temperature at the nodes, stress and von Mises stress of the cells;
-    contact.pvd and contact_NNNN.vtu, a point each: pressure, friction traction on the body, gap, slip, status; of these the
-    `fields` that are chosen, at the stored states nearest to `times` (default: all). series.csv: resultants, also of every
-    contact part, and the balances of every step. The files of an earlier series in `out` are removed. `say` is called with a
-    sentence for a chosen field that the run does not have, and for a time at which no state is stored. Raises ValueError for what
-    is no run, an unknown field, fields none of which the run has, or a time beyond the run, OSError when it cannot be written.
+    Parameters
+    ----------
+    run : str or Path
+        The folder of `warmslip run`.
+    out : str or Path
+        The folder to write. With `form` "vtu": body.pvd with body_NNNN.vtu (displacement, velocity, temperature at the nodes;
+        stress and von Mises stress of the cells), contact.pvd with contact_NNNN.vtu (pressure, friction traction on the body,
+        gap, slip and status of the contact points). With "vtkhdf": all states in body.vtkhdf and contact.vtkhdf. In addition
+        series.csv (resultants, also of every contact part, and balances of every step), and reactions.csv (force and moment
+        of every support, resultants of the contact parts and heat flows of every step), where there are any.
+    fields : collection of str
+        The fields that are written; all by default.
+    times : sequence of float, optional
+        The stored states nearest to these times; all by default.
+    form : str
+        "vtu" or "vtkhdf".
+    progress : function, optional
+        Called with the numbers of states that are written and that there are.
+    warn : function
+        Called with a sentence for a chosen field that the run does not have, and for a time at which no state is stored.
+
+    Returns
+    -------
+    int
+        The number of states.
+
+    Raises
+    ------
+    ValueError
+        For what is no run, an unknown field or form, fields none of which the run has, or a time beyond the run.
+    OSError
+        When a file cannot be written.
     """
     if isinstance(fields, str) or isinstance(times, str | float | int):
         name, given = ("fields", fields) if isinstance(fields, str) else ("times", times)
         raise TypeError(f"{name}: {given!r} is no list; write [{given!r}]")
+    if form not in FORMS:
+        raise ValueError(f"there is no form '{form}'; give {' or '.join(FORMS)}")
     for name in fields:
         if name not in FIELDS:
             near = difflib.get_close_matches(name, FIELDS, 1)
@@ -88,23 +119,17 @@ def export(
             if OWN.fullmatch(earlier.name):
                 earlier.unlink()
         _series(t, d, folder / "series.csv")
-        files: list[tuple[float, str]] = []
-        points: list[tuple[float, str]] = []
-        for done, i in enumerate(chosen, start=1):
-            time = float(t.time[i])
-            if set(fields) & set(BODY):
-                u, w, theta = (None if one is None else np.asarray(one[i]) for one in (t.u, t.w, t.theta))
-                write_vtu(folder / f"body_{i:04d}.vtu", d, u, w, theta, fields)
-                files.append((time, f"body_{i:04d}.vtu"))
-            touching = {name: values for name, values in contact_at(t, d, i).items() if name in fields}
-            if touching:
-                _contact(folder / f"contact_{i:04d}.vtu", d, touching)
-                points.append((time, f"contact_{i:04d}.vtu"))
-            if progress:
-                progress(done, len(chosen))
-        for name, series in (("body", files), ("contact", points)):
-            if series:
-                _pvd(folder / f"{name}.pvd", series)
+        write_table(t, d, folder / "reactions.csv")
+        with (HdfSeries if form == "vtkhdf" else VtuSeries)(folder, d) as series:
+            for done, i in enumerate(chosen, start=1):
+                if set(fields) & set(BODY):
+                    u, w, theta = (None if one is None else np.asarray(one[i]) for one in (t.u, t.w, t.theta))
+                    series.body(i, float(t.time[i]), *body_fields(d, u, w, theta, fields))
+                touching = {name: three(v) for name, v in contact_at(t, d, i).items() if name in fields}
+                if touching:
+                    series.contact(i, float(t.time[i]), touching)
+                if progress:
+                    progress(done, len(chosen))
     return len(chosen)
 
 
@@ -122,25 +147,6 @@ def _there(t: Trajectory, d: Discretisation, fields: Collection[str], warn: Call
     for name in missing:
         warn(f"the run has no {name}, which is left out; it has {has}")
     return [name for name in fields if there[name]]
-
-
-def _contact(path: Path, d: Discretisation, fields: dict[str, Array]) -> None:
-    x = three(np.asarray(d.surface.positions))
-    meshio.Mesh(
-        x,
-        [("vertex", np.arange(len(x))[:, None])],
-        point_data={name: three(values) for name, values in fields.items()},
-    ).write(path)
-
-
-def _pvd(path: Path, files: list[tuple[float, str]]) -> None:
-    lines = [f'    <DataSet timestep="{time:.17g}" file="{name}"/>' for time, name in files]
-    body = "\n".join(lines)
-    path.write_text(
-        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
-        f"  <Collection>\n{body}\n  </Collection>\n</VTKFile>\n",
-        encoding="utf-8",
-    )
 
 
 def _series(t: Trajectory, d: Discretisation, path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
+from warmslip.io import part_series
 from warmslip.io.stored_contact import StoredContact
 from warmslip.io.stored_state import StoredState
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
@@ -53,6 +54,7 @@ def _check(file: h5py.File) -> None:
     for group, names in (("steps", REPORT), ("balances", BALANCES)):
         for name in {*file[group], *names} - (LATER - set(file[group])):
             _shape(file, f"{group}/{name}", "f", None, *([d] if name == "friction_traction" else []))
+    part_series.check(file, _shape)
 
 
 def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[int, ...]:
@@ -139,6 +141,7 @@ class Trajectory(Shown):
         file = self._file
         series = [data for group in ("steps", "balances") for data in file[group].values()]
         series += [file[f"contact/{name}"] for name in CONTACT if name in file["contact"]]
+        series += [file[name] for name in part_series.DATASETS if name in file]
         steps = min(len(data) for data in series)
         states = min(len(data) for data in file["states"].values())
         last = file["steps/time"][steps - 1] if steps else 0.0
@@ -270,8 +273,8 @@ class Trajectory(Shown):
         return list(json.loads(self._read.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
-        """Every dataset of `steps`, `balances` or `contact` as arrays."""
-        fixed = () if group in ("steps", "balances") else ("positions", "normals", "weights", "part")
+        """Every dataset of `steps`, `balances`, `contact`, `reactions` or `heat_flows` as arrays."""
+        fixed = ("positions", "normals", "weights", "part") if group == "contact" else ()
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()
         }
@@ -295,6 +298,22 @@ class Trajectory(Shown):
     @cached_property
     def _assembled(self) -> Discretisation:
         return self.discretisation()
+
+    @property
+    def reactions(self) -> dict[str, dict[str, Array]]:
+        """By support, in every step: `force` on the body, (steps, d), and `moment` about the origin, (steps, 1 or 3).
+
+        Empty without supports, and for files of earlier versions. Where supports meet, see `model.reactions.Reactions`.
+        """
+        found = part_series.names(self._read, "reactions")
+        series = {what: self._read[f"reactions/{what}"][: self._steps] for what in ("force", "moment") if found}
+        return {name: {what: values[:, i] for what, values in series.items()} for i, name in enumerate(found)}
+
+    @property
+    def heat_flows(self) -> dict[str, Array]:
+        """Heat per time into the body in every step, (steps,): `exchange PART`, `friction PART`, `support PART`."""
+        found = part_series.names(self._read, "heat_flows")
+        return {name: self._read["heat_flows/flow"][: self._steps, i] for i, name in enumerate(found)}
 
     def xarray(self) -> Any:
         """The run as an `xarray.Dataset`: states, contact fields of every step, and the series of steps and balances.

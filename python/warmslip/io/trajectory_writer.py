@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from warmslip._core import Balances
+from warmslip.io.part_series import DATASETS, PartSeries
 from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
@@ -75,6 +76,7 @@ class TrajectoryWriter:
         self._rows: dict[str, list[Array]] = {}
         self._held, self._written = 0, time.monotonic()
         self._fields = [name for name in ("u", "w", "theta") if getattr(stepper, name) is not None]
+        self._parts = PartSeries(discretisation) if path is not None else None
         if path is None or comm.rank != 0:
             return
         d, points = discretisation.dim, len(discretisation.surface.weights)
@@ -121,6 +123,8 @@ class TrajectoryWriter:
             table("contact/displacement", points, d)
             table("contact/status", points, dtype="i1")
             table("contact/gap", points)
+        assert self._parts is not None
+        self._parts.create(file, table)
         if keep:
             self._copy(earlier, keep)
             self._stored = keep if keep % discretisation.scene.output.every == 0 else -1
@@ -170,9 +174,10 @@ class TrajectoryWriter:
             for group in ("steps", "balances"):
                 for name in self._file[group]:
                     self._take(file, f"{group}/{name}", np.arange(keep))
-            for name in ("force", "displacement", "status", "gap"):
-                if f"contact/{name}" in self._file:
-                    self._take(file, f"contact/{name}", np.arange(keep))
+            contact = [f"contact/{name}" for name in ("force", "displacement", "status", "gap")]
+            for name in (*contact, *DATASETS):
+                if name in self._file:
+                    self._take(file, name, np.arange(keep))
         earlier.unlink()
 
     def _take(self, file: Any, name: str, rows: Any) -> None:
@@ -189,6 +194,7 @@ class TrajectoryWriter:
         stepper, scene = self._stepper, self._d.scene
         self._taken = taken
         gap = self._d.load_vectors.on_points("gap", stepper.time) if self._writing else None
+        parts = list(self._parts.row(stepper)) if self._parts is not None else []
         if self._file is not None:
             self._append("steps/time", stepper.time)
             for name in REPORT:
@@ -196,6 +202,8 @@ class TrajectoryWriter:
             self._append("steps/friction_traction", report.friction_traction)
             for name in BALANCES:
                 self._append(f"balances/{name}", getattr(report.balances, name))
+            for name, values in parts:
+                self._append(name, values)
             if len(self._d.surface.weights):
                 shape = (-1, self._d.dim)
                 self._append("contact/force", np.reshape(stepper.contact_force, shape))

@@ -10,6 +10,7 @@ import numpy as np
 from warmslip.model.coupling import Coupled, coupled
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.foundation import ShapeGap
+from warmslip.model.load_kinks import load_kinks
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
 from warmslip.model.materials import cell_regions
@@ -25,6 +26,7 @@ def before(d: Discretisation) -> list[str]:
         *plausible_data.of_mesh(d.scene),
         *([] if "loads" in d.user_functions else plausible_data.of_scene(d.scene)),
         *_gaps(d),
+        *load_kinks(d),
         *_starts(d),
         *_coupling(d),
     ]

@@ -128,6 +128,7 @@ class Loads:
                 [data(c.heat_exchange.foundation_temperature) if c.heat_exchange else 0.0 for c in contacts]
             ),
             foundation_velocity=each([data(c.velocity) if c.velocity is not None else 0.0 for c in contacts]),
+            points=scene.loads.quadrature or 3,
         )
 
     def on_contact(self, name: str, number: int) -> Data:

@@ -18,6 +18,14 @@ def located(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> tu
 
     Raises ValueError for a point outside.
     """
+    cell, weights = cells_of(nodes, cells, points, outside)
+    if (cell < 0).any():
+        raise ValueError(f"{int((cell < 0).sum())} points of one mesh lie in no cell of the other; the bodies differ")
+    return cell, weights
+
+
+def cells_of(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> tuple[Any, Array]:
+    """As `located`, with the cell -1 for a point outside."""
     corners = nodes[cells]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
     tree = cKDTree(corners.mean(axis=1))
@@ -39,8 +47,6 @@ def located(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> tu
             best[better] = least[better]
             cell[todo[better]], weights[todo[better]] = column[better], found[better]
         cell[todo[best < INSIDE - (outside if many == NEAREST[-1] or many == len(cells) else 0)]] = -1
-    if (cell < 0).any():
-        raise ValueError(f"{int((cell < 0).sum())} points of one mesh lie in no cell of the other; the bodies differ")
     return cell, weights
 
 
@@ -58,3 +64,31 @@ def interpolated(values: Array, nodes: Array, cells: Any, points: Array, outside
     weights = np.maximum(weights, 0)
     weights /= weights.sum(axis=1, keepdims=True)
     return np.asarray(np.einsum("pi,pi...->p...", weights, values[cells[cell]]))
+
+
+def distance(nodes: Array, cells: Any, point: Array) -> float:
+    """The distance of a point outside from the body, length."""
+    faces = np.concatenate([np.delete(cells, i, axis=1) for i in range(cells.shape[1])])
+    found, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
+    corners = nodes[found[count == 1]]
+    least = _to_segments(corners[:, 0], corners[:, 1], point).min()
+    if corners.shape[1] == 3:
+        for i in (0, 1):
+            least = min(least, _to_segments(corners[:, i], corners[:, 2], point).min())
+        least = min(least, _to_insides(corners, point).min())
+    return float(least)
+
+
+def _to_segments(a: Array, b: Array, point: Array) -> Array:
+    along = b - a
+    share = np.clip(np.sum((point - a) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
+    return np.asarray(np.linalg.norm(point - a - share[:, None] * along, axis=1))
+
+
+def _to_insides(corners: Array, point: Array) -> Array:
+    """Distances to the planes of triangles where the foot lies inside, else infinite."""
+    edges = corners[:, 1:] - corners[:, :1]
+    share = np.einsum("fdi,fd->fi", np.linalg.pinv(edges), point - corners[:, 0])
+    foot = corners[:, 0] + np.einsum("fi,fid->fd", share, edges)
+    inside = (share.min(axis=1) >= 0) & (share.sum(axis=1) <= 1)
+    return np.asarray(np.where(inside, np.linalg.norm(point - foot, axis=1), np.inf))

@@ -16,6 +16,7 @@ from warmslip.io.trajectory_writer import TrajectoryWriter
 from warmslip.model import several_solutions
 from warmslip.model.foresight import before
 from warmslip.model.materials import cell_regions
+from warmslip.model.probes import refuse_outside
 from warmslip.scene.plan import Plan, plan
 from warmslip.scene.reader import library, load
 from warmslip.scene.scene import Scene
@@ -114,6 +115,7 @@ def measured(scene: Scene, *, comm: Any = None) -> Plan:
     """
     begin = time.perf_counter()
     simulation = Simulation(scene, comm=comm)
+    refuse_outside(scene, simulation.discretisation.mesh)
     setup = time.perf_counter() - begin
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()

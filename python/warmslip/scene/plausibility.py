@@ -76,6 +76,14 @@ def inside(part: str, start: float, later: float, size: float) -> list[str]:
     return []
 
 
+def kinked(key: str, count: int, of: int, what: str, points: int, change: float) -> str:
+    """Of a formula with a kink inside `count` of the cells or facets, and the share of the load that its quadrature misses."""
+    return (
+        f"the formula of {key} has a kink or a jump inside {count} of {of} {what}, and a quadrature of {points} points per "
+        f"direction misses {100 * change:.2g} % of the load: let {what} end there, or raise loads.quadrature"
+    )
+
+
 def heat_start(
     part: str, *, jump: float, share: float, step: float, sensible: float, layer: float, lumped: bool
 ) -> list[str]:

@@ -5,15 +5,18 @@ What stands below a field is its meaning in the schema, in editors and in the re
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
+from warmslip.messages import quoted
 from warmslip.scene.clock import Clock, graded, uniform
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Value
 from warmslip.scene.material_tables import HeatTable, InertiaTable, IsotropicTable, RegionTable
 from warmslip.scene.mesh_table import MeshTable
+from warmslip.scene.probe_tables import ProbeTable
 from warmslip.scene.support_tables import SupportsTable
 from warmslip.scene.types import Count, NonNegative, Positive, Table, Values
 
@@ -46,6 +49,9 @@ class LoadsTable(Table):
     """fN, force per area, by boundary part: a number or a formula an axis."""
     heat_flux: dict[str, Value] = {}
     """Heat per area and time into the body, by boundary part: a number or a formula."""
+    quadrature: Annotated[int, Field(ge=1, le=8, strict=True)] | None = None
+    """Gauss points per direction that integrate formulas of loads, sources and foundation temperatures over a cell or a facet;
+    3 unless given. More are needed where a formula has a kink or a jump inside cells."""
 
 
 class InitialTable(Table):
@@ -85,6 +91,15 @@ class OutputTable(Table):
     """Steps between two checkpoints."""
     checkpoint_minutes: Positive | None = None
     """Minutes between two checkpoints; whichever comes first."""
+    probes: dict[str, ProbeTable] | None = None
+    """Points, lines and parts whose fields are written as CSV over time. A name is of letters, digits, - and _."""
+
+    @model_validator(mode="after")
+    def _names(self) -> OutputTable:
+        for name in self.probes or {}:
+            if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
+                raise ValueError(f"probes: {quoted(name)} names no file; take letters, digits, - and _")
+        return self
 
 
 OneOrMore = Annotated[

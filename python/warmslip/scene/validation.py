@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from warmslip.scene import probe_checks
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import Expression
 from warmslip.scene.foundation_tables import ShapeTable
@@ -33,6 +34,7 @@ def problems(scene: SceneTables) -> list[str]:
         *_regions(scene),
         *_time(scene),
         *_plane(scene),
+        *probe_checks.problems(scene),
     ]
 
 

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warmslip.io import vtu
+from warmslip.io.probe_writer import ProbeWriter
 from warmslip.io.trajectory import Trajectory
 from warmslip.io.trajectory_writer import TrajectoryWriter
 from warmslip.messages import Shown
 from warmslip.model.contact_laws import Law
 from warmslip.model.discretisation import refuse_types
 from warmslip.model.loads import Loads
+from warmslip.model.probes import probes
 from warmslip.model.state import State
 from warmslip.records import provenance
 from warmslip.scene.scene import Scene
@@ -131,7 +133,7 @@ def run(
         if not resume:
             _clear(folder, *checkpoint.NAMES, checkpoint.END)
     simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)
-    rank = simulation.comm.rank
+    rank, probing = simulation.comm.rank, probes(simulation.discretisation)
     path = folder / "trajectory.h5" if folder is not None else None
     begin = 0
     if resume and folder is not None:
@@ -143,14 +145,17 @@ def run(
     with (
         Interruption() as stop,
         TrajectoryWriter(path, simulation.discretisation, simulation.stepper, simulation.comm, keep=begin) as writer,
+        ProbeWriter(folder, probing, simulation.comm, keep=begin) as probe_writer,
     ):
         for state, report in simulation.steps():
             writer.step(report, simulation.taken)
+            probe_writer.step(state)
             asked, late = stop.agreed(simulation.comm, minutes is not None and time.monotonic() - saved > 60 * minutes)
             last = simulation.finished
             due = asked or late or simulation.taken % scene.output.checkpoint == 0
             if folder is not None and (due or last):
                 writer.write()  # no checkpoint is ahead of its trajectory
+                probe_writer.write()
                 saving = simulation.take_checkpoint()
                 if rank == 0:
                     saving.write(folder, end=last)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from warmslip._core import compiler, petsc_version
+from warmslip.io import part_series
 from warmslip.model.state import largest_values, resultants
 from warmslip.records import provenance
 from warmslip.simulation.simulation import Simulation
@@ -33,6 +34,9 @@ def summary(simulation: Simulation) -> dict[str, Any]:
     counters = {name: getattr(cost, name) for name in type(cost).items}
     force = np.reshape(s.contact_force, (1, -1, d.dim))
     parts = {name: float(values[0]) for name, values in resultants(d, force).items()}
+    # a step that was rejected was evaluated last
+    evaluated = report is not None and simulation.outcome in ("completed", "interrupted")
+    by_part = part_series.last(d, s) if evaluated else {"reactions": {}, "heat_flows": {}}
     return {
         "outcome": simulation.outcome,
         "failure": simulation.failure,
@@ -46,6 +50,7 @@ def summary(simulation: Simulation) -> dict[str, Any]:
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
         "largest": largest_values(d, s),
         "contact": contact | counts | {"traction": traction, "parts": parts},
+        **by_part,
         "balances": statistics.residuals,
         "digits": digits(statistics.trusted(s.extents)),
         "newton": {

@@ -123,7 +123,7 @@ def test_a_series_holds_nothing_of_an_earlier_one(tmp_path: Path) -> None:
     assert (tmp_path / "series/contact_0004.vtu").exists()  # a refusal takes nothing away
     export(tmp_path / "short", tmp_path / "series")
     names = {path.name for path in (tmp_path / "series").iterdir()}
-    assert names == {*mine, "body.pvd", "series.csv", *(f"body_{i:04d}.vtu" for i in range(3))}
+    assert names == {*mine, "body.pvd", "series.csv", "reactions.csv", *(f"body_{i:04d}.vtu" for i in range(3))}
 
 
 def test_what_the_run_does_not_have_is_said(tmp_path: Path) -> None:

@@ -91,6 +91,9 @@ def test_what_is_drawn_is_what_was_computed(small: Small, tmp_path: Path) -> Non
     assert np.allclose(np.sort(parts["bottom"]["pressure"]), np.sort(contact["pressure"]), rtol=1e-12)
     assert np.allclose(parts["bottom"]["position"], np.linspace(0, 1, 5))
     assert panels["contact forces"]["normal force bottom"][-1] == pytest.approx(done.summary["contact"]["normal_force"])
+    assert panels["forces of supports"]["y top"][-1] == done.summary["reactions"]["top"]["force"][1]
+    flows = panels["heat into the body, per time"]
+    assert {name: values[-1] for name, values in flows.items()} == done.summary["heat_flows"]
 
 
 def test_a_run_that_was_stopped_is_drawn_too(small: Small, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ WHOLE: dict[str, Any] = {
         "expansion": {"alpha": 0.1, "reference_temperature": 2.0},
         "heating": {"thermodynamic": True},
     },
-    "loads": {"body": [0.0, "t"], "traction": {"left": [1.0, 0.0]}, "heat_flux": {"left": 1.0}},
+    "loads": {"body": [0.0, "t"], "traction": {"left": [1.0, 0.0]}, "heat_flux": {"left": 1.0}, "quadrature": 4},
     "supports": {
         "displacement": {"top": [0.0, "t"], "right": {"normal": "0.1 * t"}},
         "points": [{"at": [0.0, 1.0], "displacement": [0.0, "free"]}],
@@ -71,7 +71,16 @@ WHOLE: dict[str, Any] = {
         }
     },
     "initial": {"displacement": [0.0, "0.1 * y"], "velocity": [0.0, 0.0], "temperature": 1.0},
-    "output": {"every": 2, "checkpoint": 3, "checkpoint_minutes": 1.0},
+    "output": {
+        "every": 2,
+        "checkpoint": 3,
+        "checkpoint_minutes": 1.0,
+        "probes": {
+            "corner": {"at": [0.0, 1.0], "fields": ["stress", "temperature"], "every": 2},
+            "middle": {"line": [[0.0, 0.5], [1.0, 0.5]], "count": 11},
+            "edge": {"part": "bottom"},
+        },
+    },
 }
 FILE: dict[str, Any] = {
     "mesh": {"file": "plate_with_hole.msh", "refine": 1},

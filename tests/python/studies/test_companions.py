@@ -10,11 +10,12 @@ import pytest
 import warmslip
 from warmslip import SceneError
 from warmslip.model.discretisation import discretise
+from warmslip.model.point_location import located
 from warmslip.scene.scene import Scene
 from warmslip.studies import refinement_study
 from warmslip.studies.companions import FUNCTIONALS, QUANTITIES, Companion, coarser, march, order, slower
 from warmslip.studies.error_norms import TERMS, Comparison
-from warmslip.studies.point_values import PointComparison, located
+from warmslip.studies.point_values import PointComparison
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 
