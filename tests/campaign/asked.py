@@ -1,13 +1,14 @@
 """Errors that are asked for, on random scenes: whether the answers have them, and whether the choices are cheap.
 
-Each scene is solved for a target. The true error of the answer is its distance to a run with twice the cells and four times the
-steps. A grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the
-choice is compared with. `python tests/campaign/asked.py --count 40` takes a quarter of an hour on one core.
+Each scene is solved for a target. The true error of the answer is its distance to a finer run, and what that run errs itself. A
+grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the choice is
+compared with. `python tests/campaign/asked.py` takes half an hour on one core.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +18,27 @@ from warmslip.records import tables
 from warmslip.scene.errors import SceneError
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
-from warmslip.studies import ask
+from warmslip.studies import ask, rates
 from warmslip.studies.companions import Companion, march
+from warmslip.studies.error_estimate import richardson
 from warmslip.studies.pilots import MESHES, STEPS, Pilots, Setting
+from warmslip.studies.recording import Recording, seconds
 from warmslip.studies.refinement_study import stamp
 
+SEED = 10_000
 TARGETS = {2: 0.1, 3: 0.25}
-GRID = {2: ([8, 16, 32], [8, 32, 64], 48), 3: ([4, 8, 12], [4, 16], 16)}  # cells, counts, cells of the reference
+GRID = {
+    2: ([8, 16, 24, 32, 48], [8, 32, 64], 64),
+    3: ([4, 8, 12], [4, 16], 16),
+}  # cells, counts, cells of the reference
+
+CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
+SHORTER = {2: 4, 3: 2}  # counts of the reference for the largest of the grid
 
 
-def scene(number: int) -> Scene:
+def scene(number: int, seed: int = SEED) -> Scene:
     """A random scene: in the plane or in space, with or without heat, friction, viscosity and inertia."""
-    random = np.random.default_rng(10_000 + number)
+    random = np.random.default_rng(seed + number)
     d = 3 if random.random() < 0.2 else 2
     sides = ["left", "right", "top"] + ["front", "back"] * (d == 3)
     has = {
@@ -73,74 +83,111 @@ def scene(number: int) -> Scene:
 
 
 def true_error(answer: ask.Answer) -> float:
-    """The relative error of an answer, against twice its cells and four times its steps."""
-    one = answer.scene
-    finer: dict[str, Any] = {"mesh.n": [2 * n for n in one.mesh.counts]}
-    if one.time.tolerance is None:
-        finer["time.steps"] = 4 * one.time.steps
-    else:
-        finer["time.tolerance"] = one.time.tolerance / 16
-    (distance,), size = march([Companion(one.override(**finer)), Companion(one)], [(0, 1)])
-    return max(distance.values[name] / size[name] for name in answer.plan.quantities)
+    """The relative error of an answer over all its steps, against `CELLS` times its cells and four times its steps.
+
+    What that run errs itself is added: the estimated parts of the answer, reduced by the orders that its pilots showed.
+    """
+    one, setting, orders = answer.scene, answer.tries[-1].setting, answer.plan.orders
+    ratio = CELLS[one.mesh.dim]
+    finer: dict[str, Any] = {"mesh.n": [round(ratio * n) for n in one.mesh.counts]}
+    if one.time.tolerance is not None:
+        reference = Recording(Companion(one.override(**(finer | {"time.tolerance": one.time.tolerance / 16}))))
+        found, size = reference.distance(Companion(one)), reference.size
+    else:  # the times of the finer run contain those of the answer
+        fine = one.override(**(finer | {"time.steps": 4 * one.time.steps}))
+        (found,), size = march([Companion(fine), Companion(one)], [(0, 1)], nested=ratio == 2)
+    worst = 0.0
+    for name, parts in answer.parts.items():
+        p, q = orders[f"{setting.mesh} mesh"][name], orders[f"{setting.steps} steps"][name]
+        own = parts["space"] * ratio**-p + parts["time"] * 4.0**-q
+        worst = max(worst, _with(name, found.values[name] / (size[name] or 1.0), own))
+    return worst
 
 
-def best_of_grid(one: Scene, quantities: list[str], target: float) -> tuple[float, str]:
-    """CPU seconds and name of the cheapest setting of a grid that meets the target; infinite for none."""
-    d = one.mesh.dim
+def _with(name: str, distance: float, own: float) -> float:
+    """An error from the distance to a reference that errs by `own`; in the energy norm the two are orthogonal."""
+    return float(np.hypot(distance, own)) if name in rates.QUADRATIC else distance + own
+
+
+def _relative(reference: Recording, run: Companion, own: dict[str, float]) -> float:
+    """The largest relative error of a run, for a reference whose relative errors are `own`."""
+    found, size = reference.distance(run), reference.size
+    return max(_with(name, found.values[name] / (size[name] or 1.0), error) for name, error in own.items())
+
+
+def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, Any]:
+    """The cheapest setting of a grid that meets the target, the smallest error there is, and that of the reference.
+
+    The error of the reference is its distance to half of it, as of order one, and a part of every error.
+    Settings are run from small to large. Once one meets the target, those are left out that cost more than it for sure: their
+    kind was run with no more cells and no more steps, and that cost more. Without such a setting the whole grid is run.
+    """
+    cells, counts, finest = GRID[one.mesh.dim]
     pilots = Pilots(one, quantities, lambda _: None)
-    cells, counts, finest = GRID[d]
-    reference = pilots.companion(Setting("graded", "graded", finest, 4 * max(counts)))
-    entries: list[tuple[Setting, Companion]] = []
-    for mesh in MESHES:
-        for steps in STEPS:
-            for n in cells:
-                for count in counts:
-                    setting = Setting(mesh, steps, n, count)
-                    try:
-                        entries.append((setting, pilots.companion(setting)))
-                    except (SceneError, ValueError):  # a mesh that is too coarse to be graded
-                        continue
-    runs = [reference, *(run for _, run in entries)]
-    found, size = march(runs, [(0, i) for i in range(1, len(runs))], nested=False)
-    cost, name = np.inf, "none"
-    for (setting, run), distance in zip(entries, found, strict=True):
-        error = max(distance.values[q] / size[q] for q in quantities)
+    many = SHORTER[one.mesh.dim] * max(counts)
+    reference = Recording(pilots.companion(Setting("graded", "graded", finest, many)))
+    half = reference.distance(pilots.companion(Setting("graded", "graded", finest // 2, many // 2)))
+    own = {
+        name: richardson(name, "space", half.values[name], 1.0) / (reference.size[name] or 1.0) for name in quantities
+    }
+    todo = [Setting(*kind) for kind in itertools.product(MESHES, STEPS, cells, counts)]
+    known: list[tuple[float, Setting]] = []
+    cost, best, least = np.inf, "none", np.inf
+    for setting in sorted(todo, key=lambda one: (one.cells**2 * one.count, one.mesh)):
+        if any(spent > cost and _within(smaller, setting) for spent, smaller in known):
+            continue
+        try:
+            run = pilots.companion(setting)
+            error = _relative(reference, run, own)
+        except (SceneError, ValueError, RuntimeError):  # a mesh too coarse to be graded, or a run that is rejected
+            continue
+        known.append((run.seconds, setting))
+        least = min(least, error)
         if error <= target and run.seconds < cost:
-            cost, name = run.seconds, f"{setting.mesh} {setting.cells}, {setting.steps} {setting.count}"
-    return cost, name
+            cost, best = run.seconds, name_of(setting)
+            chosen = setting
+    if cost < np.inf:
+        cost = cost_of(pilots.make(chosen))
+    return {"best_seconds": cost, "best": best, "least_error": least, "reference_error": max(own.values())}
 
 
-def row(number: int) -> dict[str, Any]:
+def _within(smaller: Setting, other: Setting) -> bool:
+    same = smaller.mesh == other.mesh and smaller.steps == other.steps
+    return same and smaller.cells <= other.cells and smaller.count <= other.count
+
+
+def cost_of(one: Scene) -> float:
+    """CPU seconds of a setting that is run alone, the least of several runs if they are brief."""
+    run = Companion(one)
+    march([run], [])
+    return seconds(run, lambda: Companion(one))
+
+
+def name_of(setting: Setting) -> str:
+    """A setting in a cell of a table."""
+    return f"{setting.mesh} {setting.cells}, {setting.steps} {setting.count}"
+
+
+def row(number: int, seed: int = SEED, grid: bool = True) -> dict[str, Any]:
     """One scene: what was asked for, estimated and true, and what it cost against the best of the grid."""
-    one = scene(number)
+    one = scene(number, seed)
     target = TARGETS[one.mesh.dim]
     there = "+".join(name for name in ("heat", "viscosity", "inertia") if getattr(one, name) is not None)
     line: dict[str, Any] = {"scene": number, "dim": one.mesh.dim, "tables": there or "elasticity", "asked": target}
-    blank = {
-        "estimated": np.nan,
-        "true": np.nan,
-        "seconds": np.nan,
-        "all_seconds": np.nan,
-        "choice": "",
-        "best_seconds": np.nan,
-        "best": "",
-    }
+    line |= dict.fromkeys(("estimated", "true", "seconds", "all_seconds"), np.nan) | {"choice": ""}
+    line |= {"best_seconds": np.nan, "best": "", "least_error": np.nan, "reference_error": np.nan}
+    if grid:
+        line |= best_of_grid(one, ask.wanted(one, "all"), target)
     try:
         answer = ask.solve(one, target, seconds=30.0)
     except (SceneError, RuntimeError) as why:
-        return line | blank | {"outcome": str(why).replace("\n", " ")}
-    again = Companion(answer.scene)
-    march([again], [])
-    cost, name = best_of_grid(one, answer.plan.quantities, target)
-    setting = answer.tries[-1].setting
+        return line | {"outcome": str(why).replace("\n", " ")}
     return line | {
         "estimated": answer.error,
         "true": true_error(answer),
-        "seconds": again.seconds,
+        "seconds": cost_of(answer.scene),
         "all_seconds": answer.seconds,
-        "choice": f"{setting.mesh} {setting.cells}, {setting.steps} {setting.count}",
-        "best_seconds": cost,
-        "best": name,
+        "choice": name_of(answer.tries[-1].setting),
         "outcome": "solved",
     }
 
@@ -150,11 +197,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the random scenes")
+    parser.add_argument("--no-grid", action="store_true", help="leave out what the choices are compared with")
     parser.add_argument("--out", type=Path, default=Path("results/tradeoff/asked.csv"))
     given = parser.parse_args()
     rows = []
     for number in range(given.first, given.first + given.count):
-        rows.append(row(number))
+        rows.append(row(number, given.seed, not given.no_grid))
         print(rows[-1], flush=True)
         tables.write(given.out, rows, stamp(None, targets=list(TARGETS.values())))
     solved = [one for one in rows if one["outcome"] == "solved"]
