@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from warmslip.scene.errors import SceneError
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
 from warmslip.studies import ask, rates
-from warmslip.studies.companions import Companion, march
+from warmslip.studies.companions import Companion, Distance, march
 from warmslip.studies.error_estimate import richardson
 from warmslip.studies.pilots import MESHES, STEPS, Pilots, Setting
 from warmslip.studies.recording import Recording, seconds
@@ -33,7 +34,10 @@ GRID = {
 }  # cells, counts, cells of the reference
 
 CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
-SHORTER = {2: 4, 3: 2}  # counts of the reference for the largest of the grid
+SHORTER = {2: 4, 3: 2}  # steps of a reference for one of an answer, or of the largest count of the grid
+LONGEST = 5.0  # CPU seconds of a setting of the grid
+UNSURE = 2.0  # factor between the seconds of two runs that may be one
+FAR = 2.0  # targets from which on an error does not matter
 
 
 def scene(number: int, seed: int = SEED) -> Scene:
@@ -83,23 +87,23 @@ def scene(number: int, seed: int = SEED) -> Scene:
 
 
 def true_error(answer: ask.Answer) -> float:
-    """The relative error of an answer over all its steps, against `CELLS` times its cells and four times its steps.
+    """The relative error of an answer over all its steps, against `CELLS` times its cells and `SHORTER` times its steps.
 
     What that run errs itself is added: the estimated parts of the answer, reduced by the orders that its pilots showed.
     """
     one, setting, orders = answer.scene, answer.tries[-1].setting, answer.plan.orders
-    ratio = CELLS[one.mesh.dim]
+    ratio, many = CELLS[one.mesh.dim], SHORTER[one.mesh.dim]
     finer: dict[str, Any] = {"mesh.n": [round(ratio * n) for n in one.mesh.counts]}
     if one.time.tolerance is not None:
-        reference = Recording(Companion(one.override(**(finer | {"time.tolerance": one.time.tolerance / 16}))))
+        reference = Recording(Companion(one.override(**(finer | {"time.tolerance": one.time.tolerance / many**2}))))
         found, size = reference.distance(Companion(one)), reference.size
     else:  # the times of the finer run contain those of the answer
-        fine = one.override(**(finer | {"time.steps": 4 * one.time.steps}))
+        fine = one.override(**(finer | {"time.steps": many * one.time.steps}))
         (found,), size = march([Companion(fine), Companion(one)], [(0, 1)], nested=ratio == 2)
     worst = 0.0
     for name, parts in answer.parts.items():
         p, q = orders[f"{setting.mesh} mesh"][name], orders[f"{setting.steps} steps"][name]
-        own = parts["space"] * ratio**-p + parts["time"] * 4.0**-q
+        own = parts["space"] * ratio**-p + parts["time"] * many**-q
         worst = max(worst, _with(name, found.values[name] / (size[name] or 1.0), own))
     return worst
 
@@ -109,9 +113,9 @@ def _with(name: str, distance: float, own: float) -> float:
     return float(np.hypot(distance, own)) if name in rates.QUADRATIC else distance + own
 
 
-def _relative(reference: Recording, run: Companion, own: dict[str, float]) -> float:
-    """The largest relative error of a run, for a reference whose relative errors are `own`."""
-    found, size = reference.distance(run), reference.size
+def _relative(found: Distance, reference: Recording, own: dict[str, float]) -> float:
+    """The largest relative error, for a reference whose relative errors are `own`."""
+    size = reference.size
     return max(_with(name, found.values[name] / (size[name] or 1.0), error) for name, error in own.items())
 
 
@@ -119,8 +123,9 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, 
     """The cheapest setting of a grid that meets the target, the smallest error there is, and that of the reference.
 
     The error of the reference is its distance to half of it, as of order one, and a part of every error.
-    Settings are run from small to large. Once one meets the target, those are left out that cost more than it for sure: their
-    kind was run with no more cells and no more steps, and that cost more. Without such a setting the whole grid is run.
+    Settings are run from small to large, each until its error is far from the target, or it has taken much longer than the
+    cheapest that met it. Those that would for sure are left out: a run of their kind with no more cells and steps did. Those that
+    met the target in about the least time are run again, alone. `least_error` is infinite where all errors are far.
     """
     cells, counts, finest = GRID[one.mesh.dim]
     pilots = Pilots(one, quantities, lambda _: None)
@@ -132,23 +137,33 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, 
     }
     todo = [Setting(*kind) for kind in itertools.product(MESHES, STEPS, cells, counts)]
     known: list[tuple[float, Setting]] = []
-    cost, best, least = np.inf, "none", np.inf
-    for setting in sorted(todo, key=lambda one: (one.cells**2 * one.count, one.mesh)):
-        if any(spent > cost and _within(smaller, setting) for spent, smaller in known):
+    limit, least, met = LONGEST, np.inf, []
+    for setting in sorted(todo, key=lambda one: (one.steps == "adaptive", one.cells**2 * one.count, one.mesh)):
+        if any(spent > limit and _within(smaller, setting) for spent, smaller in known):
             continue
         try:
             run = pilots.companion(setting)
-            error = _relative(reference, run, own)
+            error = _relative(
+                reference.distance(run, partial(_far, run, limit, reference, own, target)), reference, own
+            )
         except (SceneError, ValueError, RuntimeError):  # a mesh too coarse to be graded, or a run that is rejected
             continue
-        known.append((run.seconds, setting))
-        least = min(least, error)
-        if error <= target and run.seconds < cost:
-            cost, best = run.seconds, name_of(setting)
-            chosen = setting
-    if cost < np.inf:
-        cost = cost_of(pilots.make(chosen))
+        if run.finished or run.seconds > limit:
+            known.append((run.seconds, setting))
+        least = min(least, error) if run.finished else least
+        if run.finished and error <= target:
+            met.append((run.seconds, setting))
+            limit = min(limit, UNSURE * run.seconds)
+    timed = [(cost_of(pilots.make(one)), name_of(one)) for spent, one in met if spent <= limit]
+    cost, best = min(timed, default=(np.inf, "none"))
     return {"best_seconds": cost, "best": best, "least_error": least, "reference_error": max(own.values())}
+
+
+def _far(
+    run: Companion, limit: float, reference: Recording, own: dict[str, float], target: float, found: Distance
+) -> bool:
+    """Whether a run is of no interest any more: too long, or far from the target."""
+    return run.seconds > limit or _relative(found, reference, own) > FAR * target
 
 
 def _within(smaller: Setting, other: Setting) -> bool:

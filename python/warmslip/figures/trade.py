@@ -19,9 +19,12 @@ LOOKS = {  # name, the keys that make it, colour and marker
     "equal steps, monolithic": ("time.coupling=monolithic", PURPLE, "s"),
     "equal steps, gauss-2": ("contact.quadrature=gauss-2", SKY, "D"),
     "graded steps": ("time.graded_to=[0.0]", ORANGE, "^"),
+    "more graded steps": ("time.graded_to, 4 x time.steps", ORANGE, "<"),
     "adaptive steps": ("time.tolerance", GREEN, "v"),
+    "adaptive steps, smaller tolerance": ("time.tolerance / 4", GREEN, "<"),
     "graded mesh": ("mesh.graded_to=['corners']", GREY, "d"),
     "graded mesh and steps": ("both graded_to", VERMILLION, "^"),
+    "graded mesh, more graded steps": ("both graded_to, 4 x time.steps", VERMILLION, "<"),
     "graded mesh, adaptive steps": ("mesh.graded_to, time.tolerance", BLUE, "v"),
     ORDINARY: ("scikit-fem", INK, "P"),
 }

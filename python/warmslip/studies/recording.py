@@ -65,10 +65,13 @@ class Recording:
         values = {name: earlier[name] + share * (later[name] - earlier[name]) for name in FUNCTIONALS}
         return SimpleNamespace(**{name: self._vectors.get(name) for name in ("u", "w", "theta")}), values
 
-    def distance(self, run: Companion) -> Distance:
-        """Advances another run to its end: its largest differences over all its times. RuntimeError when it is rejected."""
+    def distance(self, run: Companion, enough: Callable[[Distance], bool] | None = None) -> Distance:
+        """Advances another run to its end: its largest differences over all its times.
+
+        It is left where it is once `enough` says so of its differences so far. Raises RuntimeError when it is rejected.
+        """
         comparison, distance = self._comparison(run), Distance()
-        while run.next_time < np.inf:
+        while run.next_time < np.inf and not (enough and enough(distance)):
             run.advance()
             state, values = self.at(run.time)
             gaps = comparison.difference(run.simulation.stepper, state)

@@ -32,8 +32,12 @@ def _graded_steps(n: int, steps: int) -> Keys:
     return {"mesh.n": n, "time.steps": max(4, steps // 4), "time.graded_to": [0.0], "time.halvings": 8}
 
 
-def _adaptive(n: int, steps: int) -> Keys:
-    return {"mesh.n": n, "time.steps": 8, "time.tolerance": min(0.5, 16.0 / steps**2)}
+def _more_graded_steps(n: int, steps: int) -> Keys:
+    return {"mesh.n": n, "time.steps": max(4, steps), "time.graded_to": [0.0], "time.halvings": 6}
+
+
+def _adaptive(n: int, steps: int, factor: float = 16.0) -> Keys:
+    return {"mesh.n": n, "time.steps": 8, "time.tolerance": min(0.5, factor / steps**2)}
 
 
 # one name a method, from cells along a side and the number of equal steps that goes with them
@@ -43,9 +47,12 @@ METHODS: dict[str, Callable[[int, int], Keys]] = {
     "equal steps, monolithic": lambda n, m: _equal(n, m) | {"time.coupling": "monolithic"},
     "equal steps, gauss-2": lambda n, m: _equal(n, m) | {"contact.quadrature": "gauss-2"},
     "graded steps": _graded_steps,
+    "more graded steps": _more_graded_steps,
     "adaptive steps": _adaptive,
+    "adaptive steps, smaller tolerance": lambda n, m: _adaptive(n, m, 4.0),
     "graded mesh": lambda n, m: _equal(n, m) | CORNERS,
     "graded mesh and steps": lambda n, m: _graded_steps(n, m) | CORNERS,
+    "graded mesh, more graded steps": lambda n, m: _more_graded_steps(n, m) | CORNERS,
     "graded mesh, adaptive steps": lambda n, m: _adaptive(n, m) | CORNERS,
 }
 
@@ -91,16 +98,18 @@ class Contest:
         return " ".join([f"warmslip run {self.scene}", *keys])
 
 
+STEPPING = ["equal steps", "graded steps", "more graded steps", "adaptive steps", "adaptive steps, smaller tolerance"]
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
+LEVELS = [8, 12, 16, 20, 24, 32, 64, 128]  # of the paper's problem
 FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
-    "paper_cold": Contest("paper_mixed", {}, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
-    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
-    "heat": Contest("heat_slab", {}, ["equal steps", "graded steps", "adaptive steps"], [4, 8, 16, 32], 64, ratio=8),
+    "paper_cold": Contest("paper_mixed", {}, list(METHODS), LEVELS, 256),
+    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), LEVELS, 256),
+    "heat": Contest("heat_slab", {}, STEPPING, [4, 8, 16, 32], 64, ratio=8),
     "impact": Contest(
         "elastic_drop",
         {},
-        ["equal steps", "adaptive steps", "equal steps, gauss-2"],
+        ["equal steps", "adaptive steps", "adaptive steps, smaller tolerance", "equal steps, gauss-2"],
         [8, 16, 32],
         64,
         ratio=32,
@@ -109,7 +118,7 @@ CONTESTS = {
     "stick_slip": Contest(
         "sliding_block",
         {},
-        ["equal steps", "graded steps", "adaptive steps"],
+        STEPPING,
         [4, 8, 16, 32],
         64,
         ratio=16,
@@ -118,7 +127,7 @@ CONTESTS = {
     "block": Contest(
         "block_3d",
         {},
-        ["equal steps", "graded steps", "adaptive steps", "graded mesh", "graded mesh and steps"],
+        [*STEPPING, "graded mesh", "graded mesh and steps"],
         [4, 8, 12],
         20,
         ratio=2,
