@@ -28,15 +28,12 @@ from warmslip.studies.refinement_study import stamp
 
 SEED = 10_000
 TARGETS = {2: 0.1, 3: 0.25}
-GRID = {
-    2: ([8, 16, 24, 32, 48], [8, 32, 64], 64),
-    3: ([4, 8, 12], [4, 16], 16),
-}  # cells, counts, cells of the reference
-
+# cells, counts, cells of the reference
+GRID = {2: ([16, 24, 40], [8, 32, 64], 48), 3: ([4, 8, 12], [4, 16], 16)}
 CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
 SHORTER = {2: 4, 3: 2}  # steps of a reference for one of an answer, or of the largest count of the grid
 LONGEST = 5.0  # CPU seconds of a setting of the grid
-UNSURE = 2.0  # factor between the seconds of two runs that may be one
+UNSURE = 1.5  # factor between the seconds of two runs that may be one
 FAR = 2.0  # targets from which on an error does not matter
 
 
@@ -138,7 +135,7 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, 
     todo = [Setting(*kind) for kind in itertools.product(MESHES, STEPS, cells, counts)]
     known: list[tuple[float, Setting]] = []
     limit, least, met = LONGEST, np.inf, []
-    for setting in sorted(todo, key=lambda one: (one.steps == "adaptive", one.cells**2 * one.count, one.mesh)):
+    for setting in sorted(todo, key=lambda one: (one.steps == "adaptive", one.cells, one.mesh, one.count)):
         if any(spent > limit and _within(smaller, setting) for spent, smaller in known):
             continue
         try:

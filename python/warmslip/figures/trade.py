@@ -15,7 +15,7 @@ from warmslip.records import tables
 ORDINARY = "ordinary Newton"  # equal steps by another code
 LOOKS = {  # name, the keys that make it, colour and marker
     "equal steps": ("time.steps", INK, "o"),
-    "equal steps, lagged": ("time.coupling=lagged", GREY, "x"),
+    "equal steps, lagged": ("time.coupling=lagged", GREY, "h"),
     "equal steps, monolithic": ("time.coupling=monolithic", PURPLE, "s"),
     "equal steps, gauss-2": ("contact.quadrature=gauss-2", SKY, "D"),
     "graded steps": ("time.graded_to=[0.0]", ORANGE, "^"),

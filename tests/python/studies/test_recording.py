@@ -54,6 +54,15 @@ def test_states_between_two_times_are_their_mean() -> None:
     assert np.array(kept.at(0.0)[0].u.array) == pytest.approx(0.0, abs=0)
 
 
+def test_a_run_is_left_once_that_is_enough() -> None:
+    kept = Recording(Companion(paper(4, 4)))
+    run = Companion(paper(4, 8))
+    found = kept.distance(run, lambda so_far: so_far.times == 3)
+    assert found.times == 3 and run.time == 0.375 and not run.finished
+    whole = Companion(paper(4, 8))
+    assert kept.distance(whole, lambda _: False).times == 8 and whole.finished
+
+
 def test_brief_runs_are_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, begun = paper(4, 4), []
 
