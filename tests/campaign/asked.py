@@ -28,6 +28,7 @@ from warmslip.studies.refinement_study import stamp
 
 SEED = 10_000
 TARGETS = {2: 0.1, 3: 0.25}
+SECONDS = {2: 5.0, 3: 30.0}  # CPU seconds that are allowed
 # cells, counts, cells of the reference
 GRID = {2: ([16, 24, 40], [8, 32, 64], 48), 3: ([4, 8, 12], [4, 16], 16)}
 CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
@@ -191,7 +192,7 @@ def row(number: int, seed: int = SEED, grid: bool = True) -> dict[str, Any]:
     if grid:
         line |= best_of_grid(one, ask.wanted(one, "all"), target)
     try:
-        answer = ask.solve(one, target, seconds=30.0)
+        answer = ask.solve(one, target, seconds=SECONDS[one.mesh.dim])
     except (SceneError, RuntimeError) as why:
         return line | {"outcome": str(why).replace("\n", " ")}
     return line | {
