@@ -25,6 +25,7 @@ from warmslip.studies.error_estimate import orders, richardson
 FAR = 2.5  # of a choice from its pilots, in cells along a side or steps
 CLOSER = 0.1  # share of the cost of a choice that another pilot run is worth
 AGAIN = 0.25  # or share of what the pilots have cost
+SPENT = 0.5  # share of the seconds that are allowed which such runs may take
 BINDING = 0.3  # share of the error of a setting from which on a part of it matters
 HALVINGS = 8  # of the first block of graded steps
 EXPONENTS = {2: (2.2, 3.0), 3: (4.0, 6.0)}  # of cells an axis, in the cost of a step and of a factorization
@@ -205,7 +206,8 @@ class Pilots:
         It is where the first choice lies far beyond the runs there were, and where the order in time of any choice is the
         smallest that is believed and matters to its error: the steps of the pilots are then too long to show the order.
         """
-        best, worth = found[0], max(CLOSER * found[0].seconds, AGAIN * self.seconds)
+        best = found[0]
+        worth = min(max(CLOSER * best.seconds, AGAIN * self.seconds), SPENT * self.limit - self.seconds)
         mesh, cells = best.setting.mesh, self._cells[best.setting.mesh]
         finer = cells + 1 if self.file else 2 * cells
         if self.size(best.setting.cells) > FAR * self.size(cells):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from campaign import asked
 from support.processes import Command
 
 import warmslip
@@ -73,7 +74,7 @@ def test_a_choice_that_errs_too_much_is_followed_by_a_finer_one(monkeypatch: pyt
     assert len(answer.tries) >= 2 and answer.tries[-1].setting.count > 16
 
 
-SUDDEN: dict[str, Any] = {  # its loads begin at once: 64 steps do not show the order in time of the velocity
+SUDDEN: dict[str, Any] = {
     "mesh": {"n": 8},
     "time": {"end": 1.0, "steps": 8},
     "inertia": {"density": 0.3},
@@ -87,12 +88,24 @@ SUDDEN: dict[str, Any] = {  # its loads begin at once: 64 steps do not show the 
 
 def test_an_order_in_time_at_its_bound_asks_for_a_finer_pilot() -> None:
     lines: list[str] = []
-    found = ask.plan(build(SUDDEN), 0.1, say=lines.append)
+    found = ask.plan(asked.scene(25), 0.1, say=lines.append)  # a viscous body whose loads begin at once
     assert "pilot runs: equal steps, up to 64" in lines
     assert "pilot runs: equal steps, up to 128" in lines  # although its choice takes fewer steps
     assert found.orders["equal steps"]["w_L2"] > 0.45
     assert found.choice.setting.count < pilots.FAR * 128
     assert not [one for one in lines if "graded steps, up to 128" in one]  # their order is seen at once
+
+
+def test_finer_pilots_leave_time_for_the_run() -> None:
+    scene = build({key: value for key, value in SUDDEN.items() if key != "viscosity"})
+    runs = pilots.Pilots(scene, ["u_V"], lambda _: None, limit=1.0)
+    runs.measure_space("uniform", 32)
+    runs.measure_time("equal", 64)
+    choice = runs.cheapest("uniform", "equal", 0.01, 1e3, 1e12)  # its order in time is the smallest that is believed
+    runs.seconds = 0.6
+    assert not runs.look_closer([choice])
+    runs.seconds, runs.limit = 0.2, 10.0
+    assert runs.look_closer([choice])
 
 
 def test_waves_without_damping_have_half_the_order_of_a_jump() -> None:
