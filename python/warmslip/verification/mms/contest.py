@@ -24,7 +24,7 @@ from warmslip.verification.mms.manufactured import slipping
 from warmslip.verification.mms.symbolic import Manufactured
 
 SCENE = "paper_mixed"
-LEVELS = (8, 16, 32, 64, 128)
+LEVELS = (8, 16, 32, 64)
 
 
 def companion(scene: FullScene, solution: Manufactured) -> Companion:
