@@ -12,6 +12,7 @@ from matplotlib.ticker import NullFormatter
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, grid_lines, number
 from warmslip.records import tables
 
+EQUAL = 1.1  # ratio up to which two CPU times are one
 ORDINARY = "ordinary Newton"  # equal steps by another code
 LOOKS = {  # name, the keys that make it, colour and marker
     "equal steps": ("time.steps", INK, "o"),
@@ -54,7 +55,9 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
         captions.append(_best(name, rows))
     for ax in axes[-1]:
         ax.set_xlabel("CPU seconds")
-    figure.legend(list(handles.values()), list(handles), ncol=3, fontsize=8, loc="outside upper center")
+    figure.legend(
+        list(handles.values()), list(handles), ncol=max(1, columns - 1), fontsize=8, loc="outside upper center"
+    )
     return figure, " ".join(captions)
 
 
@@ -91,9 +94,14 @@ def _best(name: str, rows: list[tables.Row]) -> str:
     gain = finest["cpu_seconds"] / best["cpu_seconds"]
     text = (
         f"{_title(name)}: the error {number(finest['e_sum'])} of equal steps with n = {finest['n']} "
-        f"({number(finest['cpu_seconds'])} s) is had by {best['method']} with n = {best['n']} in "
-        f"{number(best['cpu_seconds'])} s, {number(gain)} times quicker"
+        f"({number(finest['cpu_seconds'])} s) is had "
     )
+    if gain > EQUAL:
+        text += (
+            f"by {best['method']} with n = {best['n']} in {number(best['cpu_seconds'])} s, {number(gain)} times quicker"
+        )
+    else:
+        best, text = finest, f"{text}by nothing else that is quicker"
     other = next((row for row in rows if (row["method"], row["n"]) == (ORDINARY, finest["n"])), None)
     if other is None:
         return f"{text}."

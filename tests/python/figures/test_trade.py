@@ -50,5 +50,11 @@ def test_curves_may_be_absent(tmp_path: Path, left_out: str) -> None:
     assert ("ordinary Newton" in text) == (left_out != ORDINARY)
 
 
+def test_a_caption_claims_no_gain_where_there_is_none(tmp_path: Path) -> None:
+    text = " ".join(drawn(tmp_path, [one for one in ROWS if one["method"] != "adaptive steps"]).split())
+    assert "with n = 16 (1 s) is had by nothing else that is quicker" in text
+    assert "an ordinary Newton takes 40 s, 40 times as long" in text
+
+
 def test_every_method_has_its_look() -> None:
     assert set(LOOKS) == {*METHODS, ORDINARY}
