@@ -33,7 +33,7 @@ SECONDS = {2: 5.0, 3: 30.0}  # CPU seconds that are allowed
 GRID = {2: ([16, 24, 40], [8, 32, 64], 48), 3: ([4, 8, 12], [4, 16], 16)}
 CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
 SHORTER = {2: 4, 3: 2}  # steps of a reference for one of an answer, or of the largest count of the grid
-LONGEST = 5.0  # CPU seconds of a setting of the grid
+LONGEST = {2: 1.0, 3: 5.0}  # CPU seconds of a setting of the grid
 UNSURE = 1.5  # factor between the seconds of two runs that may be one
 FAR = 2.0  # targets from which on an error does not matter
 
@@ -135,7 +135,7 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, 
     }
     todo = [Setting(*kind) for kind in itertools.product(MESHES, STEPS, cells, counts)]
     known: list[tuple[float, Setting]] = []
-    limit, least, met = LONGEST, np.inf, []
+    limit, least, met = LONGEST[one.mesh.dim], np.inf, []
     for setting in sorted(todo, key=lambda one: (one.steps == "adaptive", one.cells, one.mesh, one.count)):
         if any(spent > limit and _within(smaller, setting) for spent, smaller in known):
             continue
@@ -215,9 +215,14 @@ def main() -> None:
         "--grid", type=int, default=40, help="scenes whose choices are compared with a grid of settings"
     )
     parser.add_argument("--out", type=Path, default=Path("results/tradeoff/asked.csv"))
+    parser.add_argument(
+        "--dim", type=int, nargs="+", default=[2, 3], help="scenes in the plane (2), in space (3) or both"
+    )
     given = parser.parse_args()
     rows = []
     for number in range(given.first, given.first + given.count):
+        if scene(number, given.seed).mesh.dim not in given.dim:
+            continue
         rows.append(row(number, given.seed, len(rows) < given.grid))
         print(rows[-1], flush=True)
         tables.write(given.out, rows, stamp(None, targets=list(TARGETS.values())))
