@@ -32,6 +32,9 @@ def test_distances_are_those_of_runs_that_advance_together() -> None:
         assert kept.size[name] == pytest.approx(size[name], rel=1e-12), name
     again = kept.distance(Companion(paper(4, 8)))  # the same mesh, which is not located again
     assert again.values == pytest.approx(found.values, rel=1e-12)
+    other = kept.distance(Companion(paper(6, 8)))  # another mesh, which is
+    fresh = Recording(Companion(paper(8, 16))).distance(Companion(paper(6, 8)))
+    assert other.values == pytest.approx(fresh.values, rel=1e-12)
 
 
 def test_a_run_is_measured_at_all_its_steps() -> None:
