@@ -2,7 +2,7 @@
 
 Each scene is solved for a target. The true error of the answer is its distance to a finer run, and what that run errs itself. A
 grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the choice is
-compared with. `python tests/campaign/asked.py` takes half an hour on one core.
+compared with. All 40 scenes take more than half an hour; `--dim 2 --grid 4` takes about ten minutes.
 """
 
 from __future__ import annotations
