@@ -109,11 +109,12 @@ def _double_dot(tensor: Any, strain: Any) -> Any:
 
 
 def contact_step(
-    on: Space, system: Any, right: Any, held: Any, gap: Any, k: float, mu: float, status: Any
+    on: Space, system: Any, right: Any, held: Any, gap: Any, k: float, mu: float, status: Any, solver: Any = None
 ) -> tuple[Any, Any, Any, Any]:
     """(unknowns, status, friction, pressure): friction and pressure are forces by node, on the foundation.
 
-    `gap` is the penetration (n+1,) at w_n = 0, `status` the guess. RuntimeError when no statuses are confirmed.
+    `gap` is the penetration (n+1,) at w_n = 0, `status` the guess, `solver` a function (matrix, right-hand side) -> unknowns in
+    the place of SciPy's. RuntimeError when no statuses are confirmed.
     """
     spring = on.weights * C_NU
     for _ in range(ITERATIONS):
@@ -131,7 +132,7 @@ def contact_step(
         load[on.vertical] += np.where(closed, spring * gap, 0)
         load[on.tangential] -= drag * np.where(closed, spring * gap, 0)
         stuck = on.tangential[status == STICK]
-        y = solve(*condense(sp.csr_matrix(system + extra), load, D=np.union1d(held, stuck)))
+        y = solve(*condense(sp.csr_matrix(system + extra), load, D=np.union1d(held, stuck)), solver=solver)
         r = gap - k * y[on.vertical]
         pressure = np.where(closed, spring * r, 0)
         friction = np.where(status == STICK, (right - system @ y)[on.tangential], drag * pressure)

@@ -236,16 +236,24 @@ def _contact_parts(path: Path) -> list[Any]:
 
 
 def trade(
-    contest: Annotated[str, typer.Argument(help="paper_cold, paper_hot, heat, impact, stick_slip or block")],
+    contest: Annotated[str, typer.Argument(help="paper_cold, paper_hot, smooth, heat, impact, stick_slip or block")],
     out: Csv,
 ) -> None:
-    """Measure what accuracy costs: every method on a scene, against one reference that no method shares."""
+    """Measure what accuracy costs: every method on a scene, against one reference that no method shares, or an exact solution."""
     from warmslip.studies import tradeoff
 
-    if contest not in tradeoff.CONTESTS:
-        raise SceneError(f"there is no contest '{contest}'; give one of {', '.join(tradeoff.CONTESTS)}")
+    def say(line: str) -> None:
+        typer.echo(line, err=True)
+
+    if contest not in (*tradeoff.CONTESTS, "smooth"):
+        raise SceneError(f"there is no contest '{contest}'; give one of {', '.join([*tradeoff.CONTESTS, 'smooth'])}")
     _writable(out)
-    rows = tradeoff.run(tradeoff.CONTESTS[contest], lambda line: typer.echo(line, err=True))
+    if contest == "smooth":
+        from warmslip.verification.mms.contest import run
+
+        rows = run(say=say)
+    else:
+        rows = tradeoff.run(tradeoff.CONTESTS[contest], say)
     from warmslip.studies.refinement_study import stamp
 
     tables.write(out, rows, stamp(None, contest=contest))

@@ -15,12 +15,12 @@ from warmslip.messages import quoted
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
-from warmslip.studies.companions import QUANTITIES, march
-from warmslip.studies.error_estimate import richardson
+from warmslip.studies.companions import QUANTITIES, Distance, march
+from warmslip.studies.error_estimate import orders, richardson
 from warmslip.studies.error_norms import TERMS
-from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, describe
+from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, Setting, describe
 
-SAFETY = 1.3  # what is aimed at lies so far below what is asked for
+SAFETY = 1.15  # what is aimed at lies so far below what is asked for
 ROUND_OFF = 1e-10  # relative errors below it are not promised
 TRIES = 3  # settings that are run at most
 KEPT = 0.5  # share of the memory of the machine that a run may take
@@ -137,7 +137,8 @@ def _plan(scene: Scene, error: float, of: str, seconds: float, say: Say) -> tupl
     while True:
         found = [pilots.cheapest(mesh, steps, aim, seconds, room) for mesh, steps in pilots.kinds()]
         best = min((one for one in found if one.met), key=lambda one: one.seconds, default=None)
-        if not pilots.look_closer(best or min(found, key=lambda one: one.error)):
+        leading = best or min(found, key=lambda one: one.error)
+        if not pilots.look_closer([leading, *(one for one in found if one is not leading)]):
             break
     if best is None:
         nearest = min(found, key=lambda one: one.error)
@@ -147,11 +148,11 @@ def _plan(scene: Scene, error: float, of: str, seconds: float, say: Say) -> tupl
             f"an error of {100 * error:.3g} % cannot be had{limit}; the best is {100 * least:.3g} %, in about "
             f"{nearest.seconds:.2g} s: ask for that, or allow more"
         )
-    orders = {f"{mesh} mesh": pilots.space[mesh].order for mesh in pilots.space}
-    orders |= {f"{steps} steps": pilots.time[steps].order for steps in pilots.time}
-    orders = {kind: {name: values[name] for name in quantities} for kind, values in orders.items()}
+    seen = {f"{mesh} mesh": pilots.space[mesh].order for mesh in pilots.space}
+    seen |= {f"{steps} steps": pilots.time[steps].order for steps in pilots.time}
+    seen = {kind: {name: values[name] for name in quantities} for kind, values in seen.items()}
     others = sorted((one for one in found if one is not best), key=lambda one: (not one.met, one.seconds))
-    return Plan(best, others, quantities, pilots.seconds, orders), pilots
+    return Plan(best, others, quantities, pilots.seconds, seen), pilots
 
 
 @dataclass(frozen=True)
@@ -209,14 +210,7 @@ def solve(
         runs = [pilots.companion(one) for one in settings]
         (space, time), size = march(runs, [(0, 1), (1, 2)], progress)
         spent += sum(run.seconds for run in runs)
-        parts: dict[str, dict[str, float]] = {}
-        for name in found.quantities:
-            p, q = pilots.space[setting.mesh].order[name], pilots.time[setting.steps].order[name]
-            scale = size[name] or 1.0
-            parts[name] = {
-                "space": richardson(name, "space", space.values[name], p) / scale,
-                "time": richardson(name, "time", time.values[name], q) / scale,
-            }
+        parts = {name: _parts(pilots, setting, name, space, time, size[name]) for name in found.quantities}
         estimated = max(sum(one.values()) for one in parts.values())
         if estimated <= error or len(tries) == TRIES:
             break
@@ -232,6 +226,20 @@ def solve(
     return Answer(choice.scene, runs[0].simulation, estimated, parts, found, tries, spent)
 
 
+def _parts(
+    pilots: Pilots, setting: Setting, name: str, space: Distance, time: Distance, size: float
+) -> dict[str, float]:
+    """Relative errors of a quantity from the distances to half the mesh and to half the steps."""
+    found = {}
+    for part, gap, model, at in (
+        ("space", space.values[name], pilots.space[setting.mesh], pilots.size(setting.cells)),
+        ("time", time.values[name], pilots.time[setting.steps], float(setting.count)),
+    ):
+        order = model.order_to(name, at, gap, orders(pilots.scene, part))
+        found[part] = richardson(name, part, gap, order) / (size or 1.0)
+    return found
+
+
 def _finer(pilots: Pilots, choice: Choice, parts: dict[str, dict[str, float]], error: float, seconds: float) -> Choice:
     """The next setting after one whose error turned out to be too large: the models are made to agree with what was found."""
     setting = choice.setting
@@ -243,8 +251,7 @@ def _finer(pilots: Pilots, choice: Choice, parts: dict[str, dict[str, float]], e
         model = models_of[kind]
         constant = dict(model.constant)
         for name, found in parts.items():
-            known = found[part] * (pilots.sizes[name] or 1.0)
-            constant[name] = max(constant[name], known * float(at) ** model.order[name])
+            constant[name] = found[part] * (pilots.sizes[name] or 1.0) * float(at) ** model.order[name]
         models_of[kind] = replace(model, constant=constant)
     return pilots.cheapest(setting.mesh, setting.steps, error / SAFETY, seconds, KEPT * _memory())
 

@@ -48,6 +48,11 @@ class Companion:
         return np.inf if ahead is None else ahead.time
 
     @property
+    def finished(self) -> bool:
+        """Whether the run is at its end."""
+        return self.next_time == np.inf
+
+    @property
     def time(self) -> float:
         """The present time."""
         return float(self.simulation.stepper.time)

@@ -24,6 +24,8 @@ from warmslip.studies import rates
 from warmslip.studies.companions import QUANTITIES, Companion, Distance, coarser, march, order, slower
 
 ORDERS = {"space": (0.4, 2.0), "time": (0.4, 1.2)}  # what an observed order may be
+# backward Euler in L2 for waves that jump: half of p/(p + 1), p = 1 (Brenner & Thomee, Math. Scand. 26, 1970)
+JUMPS = 0.25
 NUMERICAL = ("space", "time", "round-off")  # parts of the distance to the model's own solution
 MODELS = ("coupling", "stiffness", "regularisation")  # parts that the model itself is off, or part of that in time
 
@@ -113,7 +115,7 @@ def estimate(scene: Scene, progress: Callable[[float, float], None] | None = Non
     runs = [Companion(one) for one in levels]
     pairs = [(0, 1), (1, 2), (0, 3), (3, 4)]
     found, size = march(runs, pairs, progress)
-    parts = {name: _numerical(name, found, size[name]) for name in QUANTITIES}
+    parts = {name: _numerical(scene, name, found, size[name]) for name in QUANTITIES}
     trusted = digits(runs[0].simulation.statistics.trusted(runs[0].simulation.stepper.extents))
     for name, known in _round_off(trusted).items():
         parts[name]["round-off"] = Part(size[name] * 10.0**-known, float("nan"))
@@ -137,6 +139,13 @@ def estimate(scene: Scene, progress: Callable[[float, float], None] | None = Non
     return Estimate(parts, size, seconds / max(runs[0].seconds, 1e-9)), runs[0].simulation
 
 
+def orders(scene: Scene, part: str) -> tuple[float, float]:
+    """The smallest and the largest order that is believed, of the error in space or time."""
+    least, most = ORDERS[part]
+    undamped = scene.moves and scene.inertia is not None and scene.inertia.density > 0 and scene.viscosity is None
+    return (JUMPS if part == "time" and undamped else least), most
+
+
 def richardson(quantity: str, part: str, gap: float, p: float) -> float:
     """The error of a solution from its distance to the one on twice its size, with order p."""
     if part == "space" and quantity in rates.QUADRATIC:
@@ -144,11 +153,11 @@ def richardson(quantity: str, part: str, gap: float, p: float) -> float:
     return float(gap / (2.0**p - 1))
 
 
-def _numerical(name: str, found: list[Distance], size: float) -> dict[str, Part]:
+def _numerical(scene: Scene, name: str, found: list[Distance], size: float) -> dict[str, Part]:
     out = {}
     for part, fine, coarse in (("space", 0, 1), ("time", 2, 3)):
         gaps = [found[coarse].values[name], found[fine].values[name]]
-        least, most = ORDERS[part]
+        least, most = orders(scene, part)
         default = 1.0
         p = order(gaps, least, most, default)
         seen = gaps[0] > 0 and gaps[1] > 0 and gaps[1] > 1e-12 * size

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.scene.errors import SceneError
@@ -18,10 +20,13 @@ from warmslip.scene.mesh_table import COARSEST
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import QUANTITIES, Companion, march, order
-from warmslip.studies.error_estimate import ORDERS, richardson
+from warmslip.studies.error_estimate import orders, richardson
 
 FAR = 2.5  # of a choice from its pilots, in cells along a side or steps
 CLOSER = 0.1  # share of the cost of a choice that another pilot run is worth
+AGAIN = 0.25  # or share of what the pilots have cost
+SPENT = 0.5  # share of the seconds that are allowed which such runs may take
+BINDING = 0.3  # share of the error of a setting from which on a part of it matters
 HALVINGS = 8  # of the first block of graded steps
 EXPONENTS = {2: (2.2, 3.0), 3: (4.0, 6.0)}  # of cells an axis, in the cost of a step and of a factorization
 MESHES, STEPS = ("uniform", "graded"), ("equal", "graded", "adaptive")
@@ -50,14 +55,22 @@ class Setting:
 
 @dataclass(frozen=True)
 class Model:
-    """An error C (1/size)^order of every quantity, and where it was seen."""
+    """An error C (1/size)^order of every quantity, and the distances to half the size from which it was found."""
 
     constant: dict[str, float]
     order: dict[str, float]
+    size: float
+    gap: dict[str, float]
 
     def at(self, quantity: str, size: float) -> float:
         """The error at so many cells along a side, or steps."""
         return float(self.constant[quantity] * size ** -self.order[quantity])
+
+    def order_to(self, quantity: str, size: float, gap: float, bounds: tuple[float, float]) -> float:
+        """The order between this size and a finer one with its own distance, safer than that of the pilots alone."""
+        if size < 1.5 * self.size or not (gap > 0 and self.gap[quantity] > 0):
+            return self.order[quantity]
+        return float(np.clip(math.log(self.gap[quantity] / gap) / math.log(size / self.size), *bounds))
 
 
 @dataclass(frozen=True)
@@ -158,11 +171,13 @@ class Pilots:
         return [distance.values for distance in found]
 
     def _model(self, part: str, gaps: list[dict[str, float]], size: float) -> Model:
-        least, most = ORDERS[part]
-        orders = {name: order([gap[name] for gap in reversed(gaps)], least, most, 1.0) for name in QUANTITIES}
+        least, most = orders(self.scene, part)
+        seen = {name: order([gap[name] for gap in reversed(gaps)], least, most, 1.0) for name in QUANTITIES}
         return Model(
-            {name: richardson(name, part, gaps[0][name], orders[name]) * size ** orders[name] for name in QUANTITIES},
-            orders,
+            {name: richardson(name, part, gaps[0][name], seen[name]) * size ** seen[name] for name in QUANTITIES},
+            seen,
+            size,
+            gaps[0],
         )
 
     def measure_space(self, mesh: str, cells: int) -> None:
@@ -185,22 +200,42 @@ class Pilots:
         gaps = self._march([Setting("uniform", steps, cells, one) for one in (count, count // 2, count // 4)])
         self.time[steps] = self._model("time", gaps, float(count))
 
-    def look_closer(self, choice: Choice) -> bool:
-        """Another pilot run where a choice lies far beyond those there were and costs far more; whether there was one."""
-        mesh, steps, worth = choice.setting.mesh, choice.setting.steps, CLOSER * choice.seconds
-        cells, count = self._cells[mesh], self._counts[steps]
+    def look_closer(self, found: Sequence[Choice]) -> bool:
+        """Another pilot run where it is worth its cost; whether there was one.
+
+        It is where the first choice lies far beyond the runs there were, and where the order in time of any choice is the
+        smallest that is believed and matters to its error: the steps of the pilots are then too long to show the order.
+        """
+        best = found[0]
+        worth = min(max(CLOSER * best.seconds, AGAIN * self.seconds), SPENT * self.limit - self.seconds)
+        mesh, cells = best.setting.mesh, self._cells[best.setting.mesh]
         finer = cells + 1 if self.file else 2 * cells
-        if self.size(choice.setting.cells) > FAR * self.size(cells):
+        if self.size(best.setting.cells) > FAR * self.size(cells):
             seconds, _ = self.cost(Setting(mesh, "equal", finer, self.count))
             if 1.3 * seconds < worth:
                 self.measure_space(mesh, finer)
                 return True
-        if choice.setting.count > FAR * count:
-            seconds, _ = self.cost(Setting("uniform", steps, 1 if self.file else self.first, 2 * count))
-            if 1.8 * seconds < worth:
-                self.measure_time(steps, 2 * count)
-                return True
+        for choice in found:
+            steps = choice.setting.steps
+            count = self._counts[steps]
+            far = choice is best and choice.setting.count > FAR * count
+            if far or self._clamped(choice.setting):
+                seconds, _ = self.cost(Setting("uniform", steps, 1 if self.file else self.first, 2 * count))
+                if 1.8 * seconds < worth:
+                    self.measure_time(steps, 2 * count)
+                    return True
         return False
+
+    def _clamped(self, setting: Setting) -> bool:
+        """Whether the error of a setting depends on an order in time that is the smallest one believed."""
+        least, _ = orders(self.scene, "time")
+        model, error = self.time[setting.steps], self.error(setting)
+        return any(
+            model.order[name] <= least
+            and self.sizes[name] > 0
+            and model.at(name, float(setting.count)) > BINDING * error * self.sizes[name]
+            for name in self.quantities
+        )
 
     def error(self, setting: Setting) -> float:
         """The predicted relative error of a setting, the largest of the quantities."""
@@ -237,7 +272,7 @@ class Pilots:
             sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8]
             if mesh == "graded":  # also on half the cells, which the companions have
                 sizes = [n for n in sizes if n % 4 == 0 and n * side >= 4 * COARSEST]
-        counts = sorted({4 * max(4, round(2 ** (i / 3))) for i in range(45)})
+        counts = sorted({4 * max(2, round(2 ** (i / 3))) for i in range(45)})
         return [Setting(mesh, steps, cells, count) for cells in sizes for count in counts if count <= MOST_STEPS]
 
     def cheapest(self, mesh: str, steps: str, aim: float, seconds: float, room: float) -> Choice:

@@ -1,21 +1,24 @@
 """What accuracy costs: every method on a scene, a setting a point, against one reference that no method shares.
 
 The reference is finer than every contestant and graded in space and time; its own error is estimated from the same on half its
-mesh and steps. An error is the largest over the times that a run and the reference both reach.
+mesh and steps. An error is the largest over all times of a run; between two of its own, the reference lies on the straight line.
 """
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from warmslip.records.tables import Row
 from warmslip.scene.errors import SceneError
 from warmslip.scene.reader import load
 from warmslip.scene.scene import Scene
-from warmslip.studies.companions import FUNCTIONALS, QUANTITIES, Companion, Distance, march
+from warmslip.studies.companions import FUNCTIONALS, QUANTITIES, Companion, Distance
 from warmslip.studies.error_norms import TERMS
+from warmslip.studies.recording import Recording, seconds
 
 Keys = dict[str, Any]
 CORNERS: Keys = {"mesh.graded_to": ["corners"]}
@@ -29,8 +32,12 @@ def _graded_steps(n: int, steps: int) -> Keys:
     return {"mesh.n": n, "time.steps": max(4, steps // 4), "time.graded_to": [0.0], "time.halvings": 8}
 
 
-def _adaptive(n: int, steps: int) -> Keys:
-    return {"mesh.n": n, "time.steps": 8, "time.tolerance": min(0.5, 16.0 / steps**2)}
+def _more_graded_steps(n: int, steps: int) -> Keys:
+    return {"mesh.n": n, "time.steps": max(4, steps), "time.graded_to": [0.0], "time.halvings": 6}
+
+
+def _adaptive(n: int, steps: int, factor: float = 16.0) -> Keys:
+    return {"mesh.n": n, "time.steps": 8, "time.tolerance": min(0.5, factor / steps**2)}
 
 
 # one name a method, from cells along a side and the number of equal steps that goes with them
@@ -40,11 +47,17 @@ METHODS: dict[str, Callable[[int, int], Keys]] = {
     "equal steps, monolithic": lambda n, m: _equal(n, m) | {"time.coupling": "monolithic"},
     "equal steps, gauss-2": lambda n, m: _equal(n, m) | {"contact.quadrature": "gauss-2"},
     "graded steps": _graded_steps,
+    "more graded steps": _more_graded_steps,
     "adaptive steps": _adaptive,
+    "adaptive steps, smaller tolerance": lambda n, m: _adaptive(n, m, 4.0),
     "graded mesh": lambda n, m: _equal(n, m) | CORNERS,
     "graded mesh and steps": lambda n, m: _graded_steps(n, m) | CORNERS,
+    "graded mesh, more graded steps": lambda n, m: _more_graded_steps(n, m) | CORNERS,
     "graded mesh, adaptive steps": lambda n, m: _adaptive(n, m) | CORNERS,
 }
+
+
+SHORT_STEPS = ("more graded steps", "adaptive steps, smaller tolerance", "graded mesh, more graded steps")
 
 
 @dataclass(frozen=True)
@@ -71,24 +84,35 @@ class Contest:
     ratio: int = 1
     graded: bool = True
 
+    def keys_of(self, method: str, n: int, finer: int = 1) -> Keys:
+        """What a method and a level set in the library scene, with so many times the steps."""
+        counts = load(self.scene).override(**self.keys).mesh.counts
+        unit = [count // min(counts) for count in counts]
+        cells = [one * n for one in unit]
+        return self.keys | METHODS[method](n, finer * self.ratio * n) | {"mesh.n": cells if len(set(cells)) > 1 else n}
+
     def at(self, method: str, n: int, finer: int = 1) -> Scene:
-        """The scene of a method and a level, with so many times the steps."""
-        scene = load(self.scene).override(**self.keys)
-        unit = [count // min(scene.mesh.counts) for count in scene.mesh.counts]
-        keys = METHODS[method](n, finer * self.ratio * n)
-        return scene.override(**(keys | {"mesh.n": [one * n for one in unit]}))
+        """The scene of a method and a level."""
+        return load(self.scene).override(**self.keys_of(method, n, finer))
+
+    def typed(self, method: str, n: int, finer: int = 1) -> str:
+        """The same as it is typed in a shell."""
+        keys = (f"--set {shlex.quote(f'{key}={value}')}" for key, value in self.keys_of(method, n, finer).items())
+        return " ".join([f"warmslip run {self.scene}", *keys])
 
 
+STEPPING = ["equal steps", "graded steps", "more graded steps", "adaptive steps", "adaptive steps, smaller tolerance"]
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
+LEVELS = [8, 16, 20, 24, 32, 64, 128]  # of the paper's problem
 FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
-    "paper_cold": Contest("paper_mixed", {}, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
-    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), [8, 16, 24, 32, 64, 128], 256),
-    "heat": Contest("heat_slab", {}, ["equal steps", "graded steps", "adaptive steps"], [4, 8, 16, 32], 64, ratio=8),
+    "paper_cold": Contest("paper_mixed", {}, list(METHODS), LEVELS, 192),
+    "paper_hot": Contest("paper_mixed", HOT, list(METHODS), LEVELS, 192),
+    "heat": Contest("heat_slab", {}, STEPPING, [4, 8, 16, 32], 64, ratio=8),
     "impact": Contest(
         "elastic_drop",
         {},
-        ["equal steps", "adaptive steps", "equal steps, gauss-2"],
+        ["equal steps", "adaptive steps", "adaptive steps, smaller tolerance", "equal steps, gauss-2"],
         [8, 16, 32],
         64,
         ratio=32,
@@ -97,7 +121,7 @@ CONTESTS = {
     "stick_slip": Contest(
         "sliding_block",
         {},
-        ["equal steps", "graded steps", "adaptive steps"],
+        STEPPING,
         [4, 8, 16, 32],
         64,
         ratio=16,
@@ -106,7 +130,7 @@ CONTESTS = {
     "block": Contest(
         "block_3d",
         {},
-        ["equal steps", "graded steps", "adaptive steps", "graded mesh", "graded mesh and steps"],
+        [*STEPPING, "graded mesh", "graded mesh and steps"],
         [4, 8, 12],
         20,
         ratio=2,
@@ -120,27 +144,41 @@ def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[R
     kind = "graded mesh and steps" if contest.graded else "equal steps"
     if contest.graded and "graded mesh and steps" not in contest.methods:
         kind = "graded steps"
-    references = [contest.at(kind, n, FINER) for n in (contest.reference, contest.reference // 2)]
-    finest = Companion(references[0])
-    rows: list[Row] = []
-    entries: list[tuple[str, int, Companion]] = [("reference, half", contest.reference // 2, Companion(references[1]))]
+    reference = Recording(Companion(contest.at(kind, contest.reference, FINER)))
+    cells = len(reference.run.simulation.discretisation.mesh.cells)
+    say(
+        f"a reference of {cells} cells and {reference.run.simulation.taken} steps: {reference.run.seconds:.3g} s of CPU"
+    )
+    half = contest.reference // 2
+    entries = [("reference, half", half, contest.at(kind, half, FINER), contest.typed(kind, half, FINER))]
     for method in contest.methods:
         for n in contest.levels:
+            if method in SHORT_STEPS and 2 * n > contest.reference // 2:
+                continue  # its steps are as short as those of the reference
             try:
-                entries.append((method, n, Companion(contest.at(method, n))))
+                entries.append((method, n, contest.at(method, n), contest.typed(method, n)))
             except (SceneError, ValueError) as why:
                 say(f"{method}, n = {n}: {why}")
-    say(f"{len(entries)} runs beside a reference of {len(finest.simulation.discretisation.mesh.cells)} cells")
-    runs = [finest, *(entry[2] for entry in entries)]
-    found, size = march(runs, [(0, i) for i in range(1, len(runs))], nested=False)
-    for (method, n, companion), distance in zip(entries, found, strict=True):
-        rows.append(row(method, n, companion, distance, size))
-    rows.append(row("reference", contest.reference, finest, Distance(), size))
-    return rows
+    found = {}
+    for method, n, scene, _ in sorted(
+        entries, key=lambda entry: entry[2].mesh.model_dump_json()
+    ):  # a mesh is located once
+        run = Companion(scene)
+        distance = reference.distance(run)
+        found[method, n] = row(method, n, run, distance, reference.size, seconds(run, partial(Companion, scene)))
+    own = row("reference", contest.reference, reference.run, Distance(), reference.size, reference.run.seconds)
+    finest = contest.typed(kind, contest.reference, FINER)
+    return [
+        *(found[method, n] | {"setting": typed, "from_ours": 0.0} for method, n, _, typed in entries),
+        own | {"setting": finest, "from_ours": 0.0},
+    ]
 
 
-def row(method: str, n: int, run: Companion, distance: Distance, size: dict[str, float]) -> Row:
-    """What one run errs and costs. `work` counts numbers of the factors that were read or, in factorizations, operated on."""
+def row(method: str, n: int, run: Companion, distance: Distance, size: dict[str, float], cost_seconds: float) -> Row:
+    """What one run errs, and costs in CPU seconds.
+
+    `work` counts numbers of the factors that were read or, in factorizations, operated on.
+    """
     s = run.simulation.stepper
     cost, sizes = s.cost, max(1, len(run.simulation.pace.record.sizes))
     kept = max(1, sum(s.has_factored(k) for k in run.simulation.pace.record.sizes))
@@ -152,7 +190,7 @@ def row(method: str, n: int, run: Companion, distance: Distance, size: dict[str,
         | {f"size_{name}": size[name] for name in (*TERMS, *FUNCTIONALS)}
         | {
             "times": distance.times,
-            "cpu_seconds": run.seconds,
+            "cpu_seconds": cost_seconds,
             "step_seconds": cost.step_seconds,
             "factor_bytes": cost.factor_bytes,
             "step_sizes": sizes,

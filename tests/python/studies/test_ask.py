@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from campaign import asked
 from support.processes import Command
 
 import warmslip
 from warmslip import SceneError
+from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
 from warmslip.studies import ask, pilots
-from warmslip.studies.companions import Companion, march
+from warmslip.studies.companions import QUANTITIES, Companion, march
+from warmslip.studies.error_estimate import JUMPS, ORDERS, orders
 
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 FLAT = {
@@ -69,6 +72,60 @@ def test_a_choice_that_errs_too_much_is_followed_by_a_finer_one(monkeypatch: pyt
     answer = ask.solve(warmslip.load("heat_slab"), 0.02, "theta_L2")
     assert answer.error <= 0.02
     assert len(answer.tries) >= 2 and answer.tries[-1].setting.count > 16
+
+
+SUDDEN: dict[str, Any] = {
+    "mesh": {"n": 8},
+    "time": {"end": 1.0, "steps": 8},
+    "inertia": {"density": 0.3},
+    "elasticity": {"lame": [10.0, 8.0]},
+    "viscosity": {"lame": [3.0, 3.0]},
+    "supports": {"displacement": ["top"]},
+    "loads": {"body": [0.3, -0.8], "traction": {"left": [0.4, -0.2]}},
+    "contact": {"part": "bottom", "stiffness": 100.0, "friction": {"coefficient": 0.4}},
+}
+
+
+def test_an_order_in_time_at_its_bound_asks_for_a_finer_pilot() -> None:
+    lines: list[str] = []
+    found = ask.plan(asked.scene(25), 0.1, say=lines.append)  # a viscous body whose loads begin at once
+    assert "pilot runs: equal steps, up to 64" in lines
+    assert "pilot runs: equal steps, up to 128" in lines  # although its choice takes fewer steps
+    assert found.orders["equal steps"]["w_L2"] > 0.45
+    assert found.choice.setting.count < pilots.FAR * 128
+    assert not [one for one in lines if "graded steps, up to 128" in one]  # their order is seen at once
+
+
+def test_finer_pilots_leave_time_for_the_run() -> None:
+    scene = build({key: value for key, value in SUDDEN.items() if key != "viscosity"})
+    runs = pilots.Pilots(scene, ["u_V"], lambda _: None, limit=1.0)
+    runs.measure_space("uniform", 32)
+    runs.measure_time("equal", 64)
+    choice = runs.cheapest("uniform", "equal", 0.01, 1e3, 1e12)  # its order in time is the smallest that is believed
+    runs.seconds = 0.6
+    assert not runs.look_closer([choice])
+    runs.seconds, runs.limit = 0.2, 10.0
+    assert runs.look_closer([choice])
+
+
+def test_waves_without_damping_have_half_the_order_of_a_jump() -> None:
+    damped = build(SUDDEN)
+    bare = build({key: value for key, value in SUDDEN.items() if key != "viscosity"})
+    assert orders(damped, "time") == ORDERS["time"]
+    assert orders(bare, "time") == (JUMPS, ORDERS["time"][1])
+    assert orders(bare, "space") == ORDERS["space"]
+    still = build({key: value for key, value in SUDDEN.items() if key not in ("viscosity", "inertia")})
+    assert orders(still, "time") == ORDERS["time"]
+
+
+@pytest.mark.parametrize("p", [0.5, 1.0, 1.5])
+def test_an_order_is_also_seen_between_pilot_and_answer(p: float) -> None:
+    gap = dict.fromkeys(QUANTITIES, 8.0**-p)
+    model = pilots.Model(gap, dict.fromkeys(QUANTITIES, 0.4), 8.0, gap)
+    assert model.order_to("u_V", 40.0, 40.0**-p, (0.1, 2.0)) == pytest.approx(p, rel=1e-12)
+    assert model.order_to("u_V", 40.0, 40.0**-p, (0.1, 0.3)) == 0.3
+    assert model.order_to("u_V", 10.0, 10.0**-p, (0.1, 2.0)) == 0.4  # too near to each other
+    assert model.order_to("u_V", 40.0, 0.0, (0.1, 2.0)) == 0.4
 
 
 def test_singular_corners_ask_for_a_graded_mesh() -> None:
