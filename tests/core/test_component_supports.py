@@ -201,12 +201,41 @@ def what_supports_leave_free_is_seen(d: int) -> None:
 def test_supports_that_meet() -> None:
     """They are joined where they agree, in any order, and refused with the place where they do not."""
     agree = {"left": ["0.1 * t", "free"], "top": ["0.1 * t", "-0.02 * t"], "bottom": [0.0, "free"]}
-    with pytest.raises(ValueError, match=r"'left' and 'bottom' hold their common node at \(0, 0\).*contradict"):
+    with pytest.raises(
+        ValueError, match=r"'left' and 'bottom' hold their common node at \(0, 0\).*'bottom' 0 along \(1, 0\)"
+    ):
         discretise(pressed(2, agree))
     agree["bottom"] = ["free", 0.0]
     results = [field(completed(pressed(2, dict(order))), "u") for order in (agree.items(), reversed(agree.items()))]
     assert np.abs(results[0] - results[1]).max() <= 1e-16
     assert results[0][0] == pytest.approx([0.1, 0.0], abs=1e-15)
+
+
+def test_dashpots_alone_hold_a_body_without_inertia() -> None:
+    simulation = completed(
+        pressed(2, {}, supports={"springs": {"top": {"damping": 1.0}}}, loads={"body": [0.3, -1.0]}, time={"steps": 4})
+    )
+    top = np.asarray(simulation.discretisation.mesh.nodes)[:, 1] == 1
+    moved = field(simulation, "w")[top]
+    assert moved[:, 1].mean() == pytest.approx(-1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_plane_in_two_parts_guides_as_in_one(d: int) -> None:
+    """An inclined bottom with coordinates of seven digits, cut into two parts of the mesh."""
+    one = pressed(d, {"bottom": {"normal": 0.0}}, n=4, loads={"body": along(d, -1.0, 0.2)}, inertia={"density": 1.0})
+    turn = np.eye(d)
+    turn[np.ix_([0, d - 1], [0, d - 1])] = [[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]]
+    _, mesh = turned(one, turn)
+    nodes, bottom = np.round(np.asarray(mesh.nodes), 7), np.asarray(mesh.parts["bottom"])
+    first = (nodes[bottom] @ turn)[:, :, 0].mean(axis=1) < 0.5
+    parts = {"bottom": bottom} | {"left": bottom[first], "right": bottom[~first]}
+    ends = []
+    for names in (["bottom"], ["left", "right"]):
+        there = getattr(_core, f"Mesh{d}").from_lists(nodes, mesh.cells, {name: parts[name] for name in names})
+        guided = one.override(supports={"displacement": {name: {"normal": 0.0} for name in names}})
+        ends.append(field(completed(guided, mesh=there), "u"))
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-9 * np.abs(ends[0]).max()
 
 
 def test_every_component_free_is_no_support() -> None:

@@ -10,6 +10,8 @@ from support.boxes import along, completed, elasticity, field, forces_of, scene
 from support.ranked import Checks
 
 from warmslip import discretise
+from warmslip.model.foundation import ShapeGap
+from warmslip.scene.foundation_tables import ShapeTable
 
 check = Checks()
 
@@ -110,6 +112,34 @@ def shapes_are_the_formulas_of_their_gaps(d: int) -> None:
         assert np.abs(np.subtract(*gaps)).max() <= 1e-14, formula
 
 
+def test_gaps_to_any_wedge_are_where_a_ray_enters_it() -> None:
+    """Random wedges, faces that turn away and steps included, against points along the ray one by one."""
+    random, along_ray = np.random.default_rng(5), np.linspace(-3, 3, 60001)
+    compared = 0
+    for _ in range(40):
+        top, at, angle = random.normal(size=2), random.uniform(-0.5, 0.5, 2), random.uniform(20, 160)
+        wedge = {"shape": "wedge", "at": at.tolist(), "normal": top.tolist(), "angle": angle}
+        x = np.array([[0.0, 0.0]])
+        gap = float(ShapeGap(ShapeTable(**wedge), np.array([[0.0, -1.0]]))(x, 0.0)[0])
+        ray = np.column_stack([0 * along_ray, -along_ray]) - at
+        unit = top / np.linalg.norm(top)
+        inside = ray @ -unit >= np.cos(np.deg2rad(angle / 2)) * np.linalg.norm(ray, axis=1)
+        if not inside.any() or inside[0] or along_ray[inside].max() < 0:
+            assert gap > 0
+            continue
+        compared += 1
+        assert gap == pytest.approx(along_ray[inside].min(), abs=2e-4), wedge
+    assert compared > 8
+
+
+def test_a_point_deeper_than_the_centre_of_a_circle_is_inside() -> None:
+    circle = ShapeTable(shape="cylinder", at=[0.0, 0.2], radius=1.0)
+    x, down = np.array([[0.0, 0.0], [0.3, 0.2], [0.0, 1.5]]), np.tile([0.0, -1.0], (3, 1))
+    gap = ShapeGap(circle, down)(x, 0.0)
+    assert gap[:2] == pytest.approx([-1.2, -np.sqrt(1 - 0.09)], abs=1e-15)
+    assert gap[2] == pytest.approx(0.3, abs=1e-15)
+
+
 def test_what_a_shape_does_not_meet_is_away() -> None:
     """Points beside a circle, and points that face away from it, touch nothing."""
     gap = {"shape": "cylinder", "at": [0.5, -0.3], "radius": 0.2}
@@ -126,6 +156,7 @@ def test_what_a_shape_does_not_meet_is_away() -> None:
         ({"velocity": [1.0, 0.0]}, "nothing feels the motion"),
         ({"velocity": [1.0, 0.0, 0.0], "friction": {"coefficient": 0.1}}, "has 3 components"),
         ({"gap": {"shape": "sphere", "at": [0.0, 0.0]}}, "a sphere needs its radius"),
+        ({"gap": {"shape": "sphere", "at": ["x", 0.0], "radius": 1.0}}, "depends on the place"),
         ({"gap": {"shape": "plane", "at": [0.0, 0.0], "normal": [0.0, 0.0]}}, "zero vector"),
         ({"gap": {"shape": "plane", "at": [0.0, 0.0], "normal": [0.0, 1.0], "radius": 1.0}}, "has no radius"),
         ({"gap": {"shape": "cylinder", "at": [0.0, 0.0], "radius": 1.0, "axis": [0.0, 1.0]}}, "axis is that of z"),

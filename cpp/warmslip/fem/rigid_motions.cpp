@@ -61,10 +61,18 @@ Eigen::MatrixXd unresisted(Eigen::MatrixXd z, const std::vector<Index>& nodes, c
     products.row(static_cast<Eigen::Index>(i)) =
         resisted.rows[forms[i]].transpose() * z.middleRows(static_cast<Eigen::Index>(at) * block, block);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> found(products.transpose() * products);
-  Eigen::Index kept = 0;  // eigenvalues are squares, and come in rising order
-  while (kept < motions && found.eigenvalues()[kept] <= rounding * static_cast<double>(forms.size())) ++kept;
-  return z * found.eigenvectors().leftCols(kept);
+  // normals of a guide that differ by the digits of coordinates hold a body that may all but slide
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(products);
+  const Eigen::Index rows = std::min(products.rows(), motions);
+  const Eigen::MatrixXd triangle = qr.matrixQR().topRows(rows).template triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> found(triangle, Eigen::ComputeFullV);
+  const auto resists = [&](Eigen::Index i) {
+    return i < found.singularValues().size() &&
+           found.singularValues()[i] > rounding * std::sqrt(static_cast<double>(forms.size()));
+  };
+  Eigen::Index held = 0;  // singular values fall
+  while (held < motions && resists(held)) ++held;
+  return z * found.matrixV().rightCols(motions - held);
 }
 
 // The unknowns of a motion in a vector of the operator, whose further ones of a node come after them.

@@ -138,6 +138,8 @@ void Stepper<d>::start(Vec u, Vec w, Vec theta, const Eigen::VectorXd& gap, doub
   take(w, now_.w, "w");
   take(theta, now_.theta, "theta");
   now_.gap = gap;
+  contact_force_ = now_.contact_force = Eigen::VectorXd::Zero(surface_.points() * d);
+  status_.assign(static_cast<std::size_t>(surface_.points()), Status::open);
   time_ = time;
   taken_ = static_cast<int>(std::lround(std::min(time / systems_->k, 2e9)));
   before_.reset();

@@ -32,6 +32,7 @@ from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
 
+FITS = 1e-6  # relative to the displacement: how far supports may be from the state that a run begins with
 NEAR = 0.5  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with
 
 
@@ -127,7 +128,9 @@ class Discretisation(Shown):
         x, initial = np.asarray(self.mesh.nodes), scene.initial
 
         if initial.run is not None:
-            return self.restart(stepper, *self._stored(initial.run, initial.time), 0.0)
+            u, w, theta = self._stored(initial.run, initial.time)
+            self._fits_supports(initial.run, u)
+            return self.restart(stepper, u, w, theta, 0.0)
 
         def start(name: str, components: int) -> Array:
             value = getattr(initial, name)
@@ -140,6 +143,18 @@ class Discretisation(Shown):
             start("temperature", 1)[:, 0],
             0.0,
         )
+
+    def _fits_supports(self, run: str, u: Array) -> None:
+        """Raises ValueError for a displacement that the supports would change at once."""
+        supports = self.load_vectors.supports
+        if not len(supports.nodes):
+            return
+        off = np.abs(u[supports.nodes] - supports.released(u[supports.nodes]) - self.load_vectors.displacement(0.0))
+        if off.max() > FITS * max(np.abs(u).max(), 1e-300):
+            raise ValueError(
+                f"initial.from: at t = 0 the supports are up to {off.max():.3g} away from where the state in '{run}' has them; "
+                "let them begin there, as in top = ['0.1 - 0.1 * t', 0.0]"
+            )
 
     def _stored(self, run: str, time: float | None) -> tuple[Array, Array, Array]:
         """The fields of a stored state on this mesh; zero where the other run has none."""
@@ -163,12 +178,14 @@ class Discretisation(Shown):
         own = (law for law in self.laws if law.functions[0].name.startswith(f"laws.{part}."))
         return contact_part(contact, next(own, None)).law
 
-    def restart(self, stepper: Any, u: Array, w: Array, theta: Array, time: float) -> Any:
+    def restart(self, stepper: Any, u: Array | None, w: Array | None, theta: Array | None, time: float) -> Any:
         """Sets the state from nodal arrays (nodes, d), (nodes, d), (nodes,), made what is given on the supports.
 
-        Fields that the problem does not have are left aside.
+        Fields that the problem does not have are left aside, and may be None.
         """
-        u, w, theta = u.copy(), w.copy(), theta.copy()
+        x = np.asarray(self.mesh.nodes)
+        u, w = (np.zeros_like(x) if field is None else field.copy() for field in (u, w))
+        theta = np.zeros(len(x)) if theta is None else theta.copy()
         supports = self.load_vectors.supports
         u[supports.nodes] = supports.released(u[supports.nodes]) + self.load_vectors.displacement(time)
         still = supports.still  # a support that moves has the velocity that is given

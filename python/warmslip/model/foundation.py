@@ -10,6 +10,8 @@ from warmslip.model.loads import data, evaluate
 from warmslip.scene.foundation_tables import ShapeTable
 from warmslip.typing import Array
 
+PARALLEL = 1e-12  # sine of the angle at which a normal meets a plane
+
 
 @dataclass(frozen=True)
 class ShapeGap:
@@ -29,9 +31,9 @@ class ShapeGap:
         d = x.shape[1]
         away = evaluate(data(self.table.at), x, t, d, "contact.gap.at") - x
         if self.table.shape == "plane":
-            return _to_plane(away, self.normals, _unit(self.table.normal))
+            return _to_half_spaces(away, self.normals, [_unit(self.table.normal)])
         if self.table.shape == "wedge":
-            return np.asarray(np.max([_to_plane(away, self.normals, side) for side in self._sides(d)], axis=0))
+            return _to_half_spaces(away, self.normals, self._sides(d))
         assert self.table.radius is not None
         directions = self.normals
         if self.table.axis is not None:  # only what is across the axis counts
@@ -58,12 +60,19 @@ def _across(vectors: Array, axis: Array) -> Array:
     return vectors - np.outer(vectors @ axis, axis)
 
 
-def _to_plane(away: Array, normals: Array, up: Array) -> Array:
-    """Along normals (points, d) to a plane that `away` leads to, with the unit normal `up` towards the body."""
-    falls, height = -(normals @ up), -(away @ up)
-    meets = falls > 1e-12
-    distance = np.divide(height, falls, out=np.abs(height), where=meets)
-    return np.where(meets, distance, np.abs(height) + np.linalg.norm(away, axis=1))
+def _to_half_spaces(away: Array, normals: Array, sides: list[Array]) -> Array:
+    """Along normals (points, d) to what half-spaces have in common; `sides` are their outward unit normals at the place that
+    `away` leads to."""
+    enter, leave = np.full(len(away), -np.inf), np.full(len(away), np.inf)
+    for side in sides:
+        height, rises = -(away @ side), normals @ side
+        crosses = np.abs(rises) > PARALLEL
+        at = np.divide(-height, rises, out=np.where(height > 0, np.inf, -np.inf), where=crosses)
+        inwards = ~crosses | (rises < 0)
+        enter = np.where(inwards, np.maximum(enter, at), enter)
+        leave = np.where(crosses & (rises > 0), np.minimum(leave, at), leave)
+    meets = np.isfinite(enter) & (enter <= leave) & (leave >= 0)
+    return np.where(meets, enter, _beside(away))
 
 
 def _to_ball(away: Array, directions: Array, radius: float) -> Array:
@@ -72,9 +81,11 @@ def _to_ball(away: Array, directions: Array, radius: float) -> Array:
     middle = (away * directions).sum(axis=1) / length2  # where the ray comes nearest to the centre
     past2 = (away**2).sum(axis=1) - middle**2 * length2  # squared distance there
     half2 = (radius**2 - past2) / length2
-    nearest = np.linalg.norm(away, axis=1) - radius
-    meets = (half2 >= 0) & (middle > 0)
-    # inside the foundation the distance is negative: the root that is smaller is where the ray enters
-    return np.where(
-        meets, middle - np.sqrt(np.maximum(half2, 0)), np.maximum(nearest, 0) + np.sqrt(np.abs(half2)) + np.abs(middle)
-    )
+    half = np.sqrt(np.maximum(half2, 0))
+    meets = (half2 >= 0) & (middle + half >= 0)
+    return np.where(meets, middle - half, _beside(away) + radius)
+
+
+def _beside(away: Array) -> Array:
+    """The gap of points whose normal misses the foundation: more than the distance to it, so that nothing touches."""
+    return np.asarray(2 * np.linalg.norm(away, axis=1) + np.abs(away).max())

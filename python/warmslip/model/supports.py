@@ -16,8 +16,9 @@ from warmslip.scene.support_tables import NormalTable
 from warmslip.typing import Array
 
 EDGE = np.cos(np.deg2rad(20))  # facets whose normals differ more from their mean hold their node one by one
-EXACT = 1e-12  # entries of directions that are nearer to 0 or 1 are rounding
-AGREE = 1e-9  # relative difference of displacements that are the same
+EXACT = 1e-14  # entries of directions and projectors that are nearer to 0 or 1 are rounding
+ALIKE = 1e-3  # directions at a smaller angle count as one, as coordinates have few digits
+AGREE, ROUNDING = 1e-6, 1e-12  # differences of displacements that are the same: relative to them, and to the body
 
 Evaluate = Callable[[Data, Array, float, int, str], Array]
 
@@ -48,14 +49,16 @@ def supports(scene: Scene, loads: Loads, mesh: Any) -> list[Support]:
     """
     d, out = scene.mesh.dim, []
     table, nodes = scene.supports, np.asarray(mesh.nodes)
+    smooth = [part for part in table.displacement if isinstance(table.moved.get(part), NormalTable)]
+    normals = _Normals(len(nodes), [(np.asarray(mesh.parts[part]), mesh.area_normals(part)) for part in smooth])
     for part in table.displacement:
         held = table.moved.get(part, [0.0] * d)
         key, name = f"supports.displacement.{part}", f"'{part}'"
         given = loads.displacement.get(part, 0.0)
         if isinstance(held, NormalTable):
             out += [
-                Support(key, name, at, normals, given, 1, 0)
-                for at, normals in _normals(len(nodes), np.asarray(mesh.parts[part]), mesh.area_normals(part))
+                Support(key, name, at, directions, given, 1, 0)
+                for at, directions in normals.of(np.asarray(mesh.parts[part]), mesh.area_normals(part))
             ]
             continue
         at = np.unique(np.asarray(mesh.parts[part]))
@@ -64,11 +67,11 @@ def supports(scene: Scene, loads: Loads, mesh: Any) -> list[Support]:
             for i, value in enumerate(held)
             if value != "free"
         ]
-    size = float(np.ptp(nodes, axis=0).max())
+    cells = nodes[np.asarray(mesh.cells)]
     for number, point in enumerate(table.points or []):
         distance = np.linalg.norm(nodes - point.at, axis=1)
         nearest = int(distance.argmin())
-        if distance[nearest] > 0.5 * size:
+        if distance[nearest] > np.ptp(cells, axis=1).max():
             where = ", ".join(f"{x:g}" for x in point.at)
             raise ValueError(
                 f"supports.points.{number}: the nearest node of ({where}) is {distance[nearest]:.3g} away; correct the place"
@@ -83,23 +86,46 @@ def supports(scene: Scene, loads: Loads, mesh: Any) -> list[Support]:
     return out
 
 
-def _normals(nodes: int, facets: Any, area: Array) -> list[tuple[Array, Array]]:
-    """Nodes of a part and a normal of each; where facets meet at an edge, their nodes come once for every facet."""
-    unit = area / np.linalg.norm(area, axis=1, keepdims=True)
-    mean = np.zeros((nodes, facets.shape[1]))
-    for i in range(facets.shape[1]):
-        np.add.at(mean, facets[:, i], area)
-    at = np.unique(facets)
-    size = np.linalg.norm(mean, axis=1, keepdims=True)
-    mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
-    turned = np.einsum("fa,fia->fi", unit, mean[facets]) < EDGE
-    edge = np.zeros(nodes, dtype=bool)
-    edge[facets[turned]] = True
-    out = [(at[~edge[at]], _exact(mean[at[~edge[at]]]))]
-    for i in range(facets.shape[1]):
-        here = edge[facets[:, i]]
-        out.append((facets[here, i], _exact(unit[here])))
-    return [(where, normals) for where, normals in out if len(where)]
+class _Normals:
+    """Normals of the nodes of several parts together, so that a surface may be cut into parts; (facets, areas) of each part."""
+
+    def __init__(self, nodes: int, parts: list[tuple[Any, Array]]) -> None:
+        facets, area = (
+            (np.concatenate(one) for one in zip(*parts, strict=True)) if parts else (np.empty((0, 2), int),) * 2
+        )
+        self._mean = np.zeros((nodes, facets.shape[1]))
+        for i in range(facets.shape[1]):
+            np.add.at(self._mean, facets[:, i], area)
+        size = np.linalg.norm(self._mean, axis=1, keepdims=True)
+        self._mean = np.divide(self._mean, size, out=np.zeros_like(self._mean), where=size > 0)
+        self._edge = np.zeros(nodes, dtype=bool)
+        if len(facets):
+            unit = area / np.linalg.norm(area, axis=1, keepdims=True)
+            self._edge[facets[np.einsum("fa,fia->fi", unit, self._mean[facets]) < EDGE]] = True
+
+    def of(self, facets: Any, area: Array) -> list[tuple[Array, Array]]:
+        """Nodes of a part and a normal of each; at an edge, a node comes once for every smooth patch of facets there."""
+        at = np.unique(facets)
+        inside = at[~self._edge[at]]
+        out = [(inside, _exact(self._mean[inside]))]
+        for node in at[self._edge[at]]:
+            patches = _patches(area[(facets == node).any(axis=1)])
+            out += [(np.array([node]), _exact(patch[None])) for patch in patches]
+        return [(where, normals) for where, normals in out if len(where)]
+
+
+def _patches(area: Array) -> list[Array]:
+    """Mean unit normals of facets that differ by no more than an edge does from the largest of them."""
+    out = []
+    size = np.linalg.norm(area, axis=1)
+    left = np.ones(len(area), dtype=bool)
+    while left.any():
+        largest = np.flatnonzero(left)[size[left].argmax()]
+        near = left & (area @ area[largest] >= EDGE * size * size[largest])
+        mean = area[near].sum(axis=0)
+        out.append(mean / np.linalg.norm(mean))
+        left &= ~near
+    return out
 
 
 def _exact(values: Array) -> Array:
@@ -147,7 +173,7 @@ class Supports:
         for m in np.unique(count):
             at = np.flatnonzero(count == m)
             forms = first[at][:, None] + np.arange(m)
-            out.append((at, forms, np.linalg.pinv(directions[forms], rcond=1e-9)))
+            out.append((at, forms, np.linalg.pinv(directions[forms], rcond=ALIKE)))
         return out
 
     @cached_property
@@ -214,11 +240,11 @@ class Supports:
             return out
         where, directions, number, order = self._forms
         given = np.concatenate(self._values(t, evaluate))[order]
-        scale = np.abs(given).max()
+        same = max(AGREE * np.abs(given).max(), ROUNDING * float(np.ptp(self.positions, axis=0).max()))
         for at, forms, inverse in self._groups:
             out[at] = np.einsum("naf,nf->na", inverse, given[forms])
             left = np.abs(np.einsum("nfa,na->nf", directions[forms], out[at]) - given[forms]).max(axis=1)
-            if scale > 0 and (left > AGREE * scale).any():
+            if (left > same).any():
                 raise ValueError(self._conflict(int(at[left.argmax()]), where, number, given, t))
         return out
 
@@ -233,10 +259,13 @@ class Supports:
         return out
 
     def _conflict(self, node: int, where: Array, number: Array, given: Array, t: float) -> str:
-        here = np.flatnonzero(where == node)
+        here, directions = np.flatnonzero(where == node), self._forms[1]
         names = list(dict.fromkeys(self.parts[i].name for i in number[here]))
         place = ", ".join(f"{x:.4g}" for x in self.positions[self.nodes[node]])
-        values = " and ".join(f"{given[i]:.4g}" for i in here)
+        along = [", ".join(f"{x:.3g}" for x in directions[i]) for i in here]
+        values = ", ".join(
+            f"{self.parts[number[i]].name} {given[i]:.4g} along ({way})" for i, way in zip(here, along, strict=True)
+        )
         return (
             f"supports: {' and '.join(names)} hold their common node at ({place}) at displacements that contradict each other "
             f"at t = {t:.4g} ({values}); make them agree there, or leave a component free"

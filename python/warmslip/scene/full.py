@@ -144,6 +144,7 @@ def _formulas(scene: Scene) -> list[tuple[str, Any]]:
         data["contact.gap"] = contact.gap
         exchange = contact.heat_exchange
         data["contact.heat_exchange.foundation_temperature"] = exchange.foundation_temperature if exchange else 0.0
-    held = {"supports.displacement": scene.supports.moved, "supports.temperature": scene.supports.warmed}
+    moved = {part: held if isinstance(held, list) else held.model_dump() for part, held in scene.supports.moved.items()}
+    held = {"supports.displacement": moved, "supports.temperature": scene.supports.warmed}
     found = [(key, v) for key, value in data.items() for v in (value if isinstance(value, list) else [value])]
     return [(key, v) for key, v in found if isinstance(v, str)] + [(key, value) for key, value in held.items() if value]

@@ -58,7 +58,10 @@ class Scene(Shown, SceneTables):
         return self._hash(kept | {"step": f"{self.step:.10e}"})
 
     def _hash(self, tables: dict[str, Any]) -> str:
-        data = json.dumps(tables, sort_keys=True)
+        initial = {
+            key: value for key, value in tables.get("initial", {}).items() if key != "from"
+        }  # its content counts
+        data = json.dumps(tables | {"initial": initial}, sort_keys=True)
         if self.mesh.file is not None:
             data += files.read(self.mesh.file).digest
         if self.initial.run is not None:

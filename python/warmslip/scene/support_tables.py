@@ -114,12 +114,8 @@ class SupportsTable(Table):
 
     @property
     def hold(self) -> bool:
-        """Whether anything resists a displacement."""
-        return bool(
-            self.displacement
-            or self.points
-            or any(s.stiffness or s.normal_stiffness for s in (self.springs or {}).values())
-        )
+        """Whether anything resists a motion."""
+        return bool(self.displacement or self.points or self.springs)
 
     @property
     def warmed(self) -> dict[str, float | str]:

@@ -63,7 +63,7 @@ class FixedPace:
 
     def start_at(self, time: float) -> None:
         """Begins with the step after a time. Raises ValueError where no step ends."""
-        self.taken = int(np.searchsorted(self._clock.times, time * (1 - SAME))) + 1
+        self.taken = int(np.searchsorted(self._clock.times, time * (1 + SAME), side="right"))
         if not self.reached(time):
             raise ValueError(NO_STEP.format(time))
 
@@ -123,8 +123,8 @@ class AdaptivePace:
 
     def start_at(self, time: float) -> None:
         """Begins with the step after a time. Raises ValueError where no step of the longest size ends."""
-        self.taken = round(time / self._end * self._steps)
-        self.ticks = self.taken * 2**FLOOR
+        self.taken = max(0, round(time / self._end * self._steps))
+        self.ticks, self.level, self.waste = self.taken * 2**FLOOR, 0, 0.0
         if not self.reached(time):
             raise ValueError(NO_STEP.format(time))
 

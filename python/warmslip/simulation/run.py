@@ -130,6 +130,8 @@ def run(
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         _refuse_open(folder / "trajectory.h5", comm)
+        if scene.initial.run is not None and Path(scene.initial.run).resolve() == (folder / "trajectory.h5").resolve():
+            raise ValueError(f"initial.from: the run would overwrite '{scene.initial.run}'; choose another folder")
         if not resume:
             _clear(folder, *checkpoint.NAMES, checkpoint.END)
     simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)

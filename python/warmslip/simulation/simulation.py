@@ -135,8 +135,10 @@ class Simulation(Shown):
         ValueError
             When no step of the scene begins at the time of a state that was set.
         """
-        if self.taken == 0 and self.stepper.time != 0:  # the state was set by hand
+        if not self.pace.reached(self.stepper.time):  # the state was set by hand
             self.pace.start_at(self.stepper.time)
+            if self.local_error is not None:
+                self.local_error = LocalError(self.discretisation, self.stepper, self.scene.step)
         while (step := self.pace.next()) is not None:
             if (loads := self._data(step)) is None:
                 return
@@ -279,6 +281,6 @@ class Simulation(Shown):
             if not self.pace.reached(self.stepper.time):
                 raise ValueError(
                     f"the run in {folder} is at t = {found.time:.6g} after {found.step} steps, where this scene has no such "
-                    "step; keep end/steps, and an end that is no earlier"
+                    "step; keep end/steps, an end that is no earlier, and equal steps (graded ones change with the end)"
                 )
         return self.taken

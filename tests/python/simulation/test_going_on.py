@@ -85,6 +85,27 @@ def test_states_that_are_not_there(initial: dict[str, Any], message: str) -> Non
         Simulation(scene(initial=initial))
 
 
+def test_supports_begin_where_the_state_has_them(tmp_path: Path) -> None:
+    """A state whose support has moved does not jump back."""
+    moving = scene(**{"supports.displacement": {"top": [0.0, "-0.01 * t"]}})
+    first = warmslip.run(moving, out=tmp_path / "one")
+    begin = {"from": str(first.trajectory)}
+    with pytest.raises(ValueError, match=r"supports are up to 0.005 away"):
+        warmslip.run(moving.override(initial=begin))
+    on = moving.override(**{"supports.displacement": {"top": [0.0, "-0.005 - 0.01 * t"]}, "initial": begin})
+    assert warmslip.run(on).completed
+    with pytest.raises(ValueError, match="would overwrite"):
+        warmslip.run(on, out=tmp_path / "one")
+    assert first.trajectory is not None and first.trajectory.exists()
+
+
+def test_the_path_of_a_state_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = warmslip.run(scene(), out=tmp_path / "one")
+    monkeypatch.chdir(tmp_path)
+    one, other = (scene(initial={"from": path}) for path in ("one/trajectory.h5", str(first.trajectory)))
+    assert one.digest() == other.digest()
+
+
 def test_a_time_that_is_not_stored(tmp_path: Path) -> None:
     first = warmslip.run(scene(), out=tmp_path)
     with pytest.raises(ValueError, match=r"holds no state at t = 0.3; the nearest is at 0.3125"):
@@ -114,6 +135,13 @@ def test_steps_begin_at_the_time_of_a_state_that_was_set() -> None:
     assert ends[-1] == 2.0
     assert len(ends) == 10
     assert np.abs(again.discretisation.field(again.stepper.u) - states[-1][0]).max() <= 1e-12
+    for time, first in ((0.5, 0.6), (0.0, 0.1)):  # also of a simulation that has stepped, back to an earlier time
+        state = states[round(10 * time) - 1] if time else (0 * states[0][0], 0 * states[0][1], 0 * states[0][2])
+        whole.discretisation.restart(whole.stepper, *state, time)
+        ends = [one.time for one, _ in whole.steps()]
+        assert ends[0] == pytest.approx(first)
+        assert ends[-1] == 2.0
+        assert np.abs(whole.discretisation.field(whole.stepper.u) - states[-1][0]).max() <= 1e-12
     between = Simulation(moving)
     between.discretisation.restart(between.stepper, *states[9], 1.05)
     with pytest.raises(ValueError, match=r"at t = 1.05, where no step of the scene ends"):
