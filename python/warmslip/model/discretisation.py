@@ -24,7 +24,7 @@ from warmslip.model.meshes import make_mesh
 from warmslip.model.point_location import interpolated
 from warmslip.model.prescribed import PrescribedContact
 from warmslip.model.supports import Supports, part_springs, supports
-from warmslip.scene import stored_state
+from warmslip.scene import initial_state
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
 from warmslip.scene.structure import structure
@@ -158,7 +158,7 @@ class Discretisation(Shown):
 
     def _stored(self, run: str, time: float | None) -> tuple[Array, Array, Array]:
         """The fields of a stored state on this mesh; zero where the other run has none."""
-        found, x = stored_state.read(run, time), np.asarray(self.mesh.nodes)
+        found, x = initial_state.read(run, time), np.asarray(self.mesh.nodes)
         same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, self.mesh.cells)
         none = {"u": np.zeros_like(x), "w": np.zeros_like(x), "theta": np.zeros(len(x))}
         out = []

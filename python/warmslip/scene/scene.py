@@ -10,7 +10,7 @@ from pydantic import ValidationError, model_validator
 
 from warmslip.mesh import files
 from warmslip.messages import Shown, quoted
-from warmslip.scene import stored_state
+from warmslip.scene import initial_state
 from warmslip.scene.errors import refusal, validated
 from warmslip.scene.overrides import replace
 from warmslip.scene.tables import SceneTables
@@ -65,7 +65,7 @@ class Scene(Shown, SceneTables):
         if self.mesh.file is not None:
             data += files.read(self.mesh.file).digest
         if self.initial.run is not None:
-            data += stored_state.digest(self.initial.run)
+            data += initial_state.digest(self.initial.run)
         return hashlib.sha256(data.encode()).hexdigest()[:16]
 
     def override(self, **values: Any) -> Self:

@@ -18,7 +18,7 @@ PIECE = 2**24  # bytes that are hashed at once
 
 
 @dataclass(frozen=True)
-class StoredState:
+class InitialState:
     """Fields of a run at a time: u, w (nodes, d), theta (nodes,), None where absent; nodes (n, d) and cells (c, d+1)."""
 
     nodes: Array
@@ -29,7 +29,7 @@ class StoredState:
     theta: Array | None
 
 
-def read(path: str, time: float | None = None) -> StoredState:
+def read(path: str, time: float | None = None) -> InitialState:
     """The state of a trajectory at a time, the last one for None.
 
     Raises
@@ -54,7 +54,7 @@ def read(path: str, time: float | None = None) -> StoredState:
         raise ValueError(
             f"initial.time: '{path}' holds no state at t = {time:g}; the nearest is at {times[i]:.6g} (output.every stores more)"
         )
-    return StoredState(nodes, cells, float(times[i]), **fields)
+    return InitialState(nodes, cells, float(times[i]), **fields)
 
 
 def digest(path: str) -> str:
