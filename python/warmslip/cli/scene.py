@@ -271,6 +271,9 @@ def explain(
     scene: SceneName,
     set_: Set = None,
     trial: Annotated[bool, typer.Option(help="set up and take a few steps to tell the cost")] = True,
+    draw: Annotated[
+        Path | None, typer.Option(help="draw mesh, parts, supports, loads and foundation into a PNG")
+    ] = None,
 ) -> None:
     """Say what a scene will do and cost before it runs: fields, operators, solver, what could be left out, what is missing."""
     from mpi4py import MPI
@@ -293,6 +296,18 @@ def explain(
         refuse_outside(checked, mesh)
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plan.text(found))
+        if draw is not None:
+            _draw(checked, draw)
+
+
+def _draw(scene: Scene, out: Path) -> None:
+    """Draws a scene before it runs."""
+    from warmslip.figures import scene as drawing
+    from warmslip.figures import style
+    from warmslip.report.sketch import sketch
+
+    with style.applied():
+        style.save(*drawing.scene(sketch(scene), scene.title or "scene"), out)
 
 
 def list_() -> None:

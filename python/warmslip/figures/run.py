@@ -76,7 +76,7 @@ def creases(nodes: Array, triangles: Any, towards: Array, turn: float = 30.0) ->
     return edges[first[sharp & seen]]
 
 
-def _directions(ax: Any, elevation: float, azimuth: float) -> None:
+def directions(ax: Any, elevation: float, azimuth: float) -> None:
     """Three arrows along the axes, seen from a direction (radians), in the lower left corner."""
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
@@ -117,7 +117,7 @@ def panel_on(figure: Any, ax: Any, body: Body, name: str, *, factor: float, norm
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=high - low)
         ax.set_axis_off()
         ax.view_init(*_seen_from(body))
-        _directions(ax, elevation, azimuth)
+        directions(ax, elevation, azimuth)
     else:
         drawn: Any = {"cmap": colours, "norm": norm, "rasterized": True}
         if len(values) == len(body.triangles):

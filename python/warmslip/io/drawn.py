@@ -26,7 +26,7 @@ def body(t: Trajectory, d: Discretisation, number: int) -> Body:
     """A stored state as something to draw; a body in space by its surface."""
     u, w, theta = (None if one is None else np.asarray(one[number]) for one in (t.u, t.w, t.theta))
     nodes, cells = np.asarray(d.mesh.nodes), np.asarray(d.mesh.cells)
-    triangles, of_cell = (cells, np.arange(len(cells))) if d.dim == 2 else _surface(cells)
+    triangles, of_cell = (cells, np.arange(len(cells))) if d.dim == 2 else surface(cells)
     fields: dict[str, Array] = {}
     if u is not None:
         fields |= {
@@ -49,7 +49,7 @@ def body(t: Trajectory, d: Discretisation, number: int) -> Body:
     )
 
 
-def _surface(cells: Any) -> tuple[Any, Any]:
+def surface(cells: Any) -> tuple[Any, Any]:
     """Facets of tetrahedra that belong to one alone, and to which: (facets, 3), (facets,)."""
     facets = np.concatenate([np.delete(cells, i, axis=1) for i in range(4)])
     _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)

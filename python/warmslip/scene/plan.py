@@ -11,6 +11,7 @@ from warmslip.scene import plausible_data
 from warmslip.scene.contact_tables import ContactTable
 from warmslip.scene.expressions import constant
 from warmslip.scene.material_tables import ExpansionTable, HeatingTable
+from warmslip.scene.roles import held_along
 from warmslip.scene.scene import Scene
 from warmslip.scene.validation import contact_keys, coupling_tables
 
@@ -208,17 +209,11 @@ def _clock(scene: Scene) -> list[str]:
 
 def _partial_supports(scene: Scene) -> list[str]:
     """What is held in some directions, and what is on springs."""
-    table, axes = scene.supports, "xyz"[: scene.mesh.dim]
-
-    def along(held: Any) -> str:
-        if not isinstance(held, list):
-            return "along its normal"
-        return "along " + " and ".join(axis for axis, value in zip(axes, held, strict=True) if value != "free")
-
-    out = [f"'{part}' is held {along(table.moved[part])}" for part in table.guided]
+    table, d = scene.supports, scene.mesh.dim
+    out = [f"'{part}' is held {held_along(table.moved[part], d)}" for part in table.guided]
     for point in table.points or []:
         place = ", ".join(f"{x:g}" for x in point.at)
-        out.append(f"the node nearest to ({place}) is held {along(point.displacement or [0.0] * len(axes))}")
+        out.append(f"the node nearest to ({place}) is held {held_along(point.displacement or [0.0] * d, d)}")
     out += [f"'{part}' is on springs or dashpots" for part in table.springs or {}]
     return out
 
