@@ -11,6 +11,7 @@ from support.boxes import along, completed, elasticity, field, fields, misses, s
 from support.ranked import Checks
 
 from warmslip import _core, discretise
+from warmslip.scene.reader import build
 from warmslip.simulation.simulation import Simulation
 
 check = Checks()
@@ -80,14 +81,15 @@ def guides_may_be_inclined(d: int) -> None:
         assert np.abs(reactions[1] - reactions[0] @ turn.T).max() <= 1e-12 * np.abs(reactions[0]).max()
 
 
-def mirrored(d: int, mesh: Any) -> Any:
-    """The mesh with its mirror images across every axis but the last, on the unit box."""
+def mirrored(d: int, mesh: Any, axes: Any = None) -> Any:
+    """The mesh with its mirror images across some axes, all but the last for None; of the parts those that stay outside."""
+    keep = ("bottom", "top") if axes is None else ("hole", "right")
     nodes, cells, parts = (
         np.asarray(mesh.nodes),
         np.asarray(mesh.cells),
         {k: np.asarray(v) for k, v in mesh.parts.items()},
     )
-    for axis in range(d - 1):
+    for axis in range(d - 1) if axes is None else axes:
         image = nodes * np.where(np.arange(d) == axis, -1.0, 1.0)
         distance, same = cKDTree(nodes).query(image)
         new = np.flatnonzero(distance > 1e-9)
@@ -97,9 +99,7 @@ def mirrored(d: int, mesh: Any) -> Any:
         turned_over = number[cells]
         turned_over[:, :2] = turned_over[:, 1::-1].copy()
         cells = np.vstack([cells, turned_over])
-        parts = {
-            name: np.vstack([facets, number[facets]]) for name, facets in parts.items() if name in ("bottom", "top")
-        }
+        parts = {name: np.vstack([facets, number[facets]]) for name, facets in parts.items() if name in keep}
     return getattr(_core, f"Mesh{d}").from_lists(nodes, cells, parts)
 
 
@@ -155,6 +155,50 @@ def a_part_of_a_body_on_symmetry_planes_is_the_whole_body(d: int) -> None:
             assert distance.max() <= 1e-12
             difference = np.abs(field(whole, "u")[nearest] - field(part, "u")).max()
             assert difference <= 1e-12 * np.abs(field(part, "u")).max(), (quadrature, stiffness, difference)
+
+
+def plate(radius: float, side: float, n: int) -> Any:
+    """A quarter of a square plate with a round hole about the origin; parts hole, left, bottom, and right outside."""
+    angles, shares = np.linspace(0, np.pi / 2, 2 * n + 1), np.linspace(0, 1, n + 1) ** 1.5
+    inner = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    outer = side * inner / np.abs(inner).max(axis=1, keepdims=True)
+    nodes = (inner[:, None] + shares[None, :, None] * (outer - inner)[:, None]).reshape(-1, 2)
+    nodes[np.abs(nodes) < 1e-15] = 0.0
+    number = np.arange(len(nodes)).reshape(2 * n + 1, n + 1)
+    a, b, c, e = (block.ravel() for block in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
+    cells = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, e])])
+
+    def line(along: Any) -> Any:
+        return np.column_stack([along[:-1], along[1:]])
+
+    parts = {
+        "hole": line(number[:, 0]),
+        "right": line(number[:, -1]),
+        "bottom": line(number[0]),
+        "left": line(number[-1]),
+    }
+    return _core.Mesh2.from_lists(nodes, cells, parts)
+
+
+def test_a_quarter_of_a_plate_with_a_hole_is_the_whole_plate() -> None:
+    """A hole that presses on a soft pin, and a pull outside."""
+    quarter = plate(0.3, 1.0, 6)
+    base = {
+        "mesh": {"file": "plate_with_hole.msh"},
+        "time": {"steps": 3},
+        "elasticity": elasticity(2, 10.0, 0.3),
+        "loads": {"traction": {"right": ["0.2 * x", "0.1 * y"]}},
+        "contact": {"part": "hole", "stiffness": 50.0, "gap": -0.01},
+    }
+    pins = [{"at": [0.3, 0.0], "displacement": ["free", 0.0]}, {"at": [0.0, 0.3], "displacement": [0.0, "free"]}]
+    part = completed(
+        build(base | {"supports": {"displacement": {"left": [0.0, "free"], "bottom": ["free", 0.0]}}}), mesh=quarter
+    )
+    whole = completed(build(base | {"supports": {"points": pins}}), mesh=mirrored(2, quarter, (0, 1)))
+    nodes = [np.asarray(run.discretisation.mesh.nodes) for run in (part, whole)]
+    _, nearest = cKDTree(nodes[1]).query(nodes[0])
+    difference = np.abs(field(whole, "u")[nearest] - field(part, "u")).max()
+    assert difference <= 1e-12 * np.abs(field(part, "u")).max()
 
 
 @check
