@@ -54,8 +54,8 @@ struct Problem {
   std::vector<std::string> prescribed_displacement;  ///< parts with given displacement (2.5)
   std::vector<std::string> prescribed_temperature;   ///< parts with given temperature (2.7)
   std::vector<ContactPart> contacts;
-  std::vector<HeldNode<d>> held_nodes;  ///< with a displacement that is given in some directions
-  std::vector<PartSprings<d>> springs;  ///< springs and dashpots on parts
+  std::vector<HeldNode<d>> held_nodes{};  ///< with a displacement that is given in some directions
+  std::vector<PartSprings<d>> springs{};  ///< springs and dashpots on parts
   bool lumped = false;  ///< capacity and exchange by the vertex rule, diagonal: no new extremes on non-obtuse meshes
 
   const Material<d>& material(Index cell) const {
