@@ -20,9 +20,10 @@ from warmslip.scene.scene import Scene
 if TYPE_CHECKING:
     from warmslip.io.trajectory import Trajectory
     from warmslip.model.contact_laws import Law
-    from warmslip.model.discretisation import Discretisation, discretise, von_mises
+    from warmslip.model.discretisation import Discretisation, discretise
     from warmslip.model.loads import Loads
     from warmslip.model.state import State
+    from warmslip.model.stress import von_mises
     from warmslip.simulation.run import Result
     from warmslip.simulation.simulation import Simulation
     from warmslip.studies.accuracy import run
@@ -64,7 +65,7 @@ _LAZY = {
     "State": "model.state",
     "Trajectory": "io.trajectory",
     "sweep": "studies.sweep",
-    "von_mises": "model.discretisation",
+    "von_mises": "model.stress",
 }
 
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "warmslip/fem/supports.hpp"
+
 namespace warmslip {
 
 template <int d>
@@ -47,9 +49,8 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   support_.assign(static_cast<std::size_t>(layout.owned()), -1);
   temperature_prescribed_.resize(support_.size());
   for (const auto& [node, held] : held_directions(problem)) {
-    const PetscInt at = layout.global_of(node) - first;
-    if (at < 0 || at >= layout.owned()) continue;
-    support_[static_cast<std::size_t>(at)] = static_cast<int>(held_.size());
+    if (!owns(layout, node)) continue;
+    support_[static_cast<std::size_t>(layout.global_of(node) - first)] = static_cast<int>(held_.size());
     held_.push_back(held);
   }
   for (const PetscInt i : operators.prescribed_temperature)

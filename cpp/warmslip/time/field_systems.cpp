@@ -1,5 +1,6 @@
 // The solves of a step: right-hand sides, contact forces, heat, and the way in and out of the coupled system.
 #include "warmslip/contact/minimal_forces.hpp"
+#include "warmslip/fem/supports.hpp"
 #include "warmslip/time/stepper.hpp"
 #include "warmslip/time/timer.hpp"
 
@@ -80,8 +81,8 @@ void Stepper<d>::hold(Vec v, Vec given) const {
   Values values(v), known(given);
   for (std::size_t i = 0; i < operators_.inclined.size(); ++i) {
     const HeldNode<d>& one = operators_.inclined[i];
+    if (!owns(layout_, one.node)) continue;
     const PetscInt at = layout_.global_of(one.node) - first;
-    if (at < 0 || at >= layout_.owned()) continue;
     auto here = (*values).template segment<d>(at * d);
     here -= (one.held * here).eval();
     if (given)

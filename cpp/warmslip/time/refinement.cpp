@@ -275,14 +275,6 @@ bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& 
   return false;
 }
 
-// The errors that may end a run: that of a contact that hardly touches is seen beside the other forces.
-template <int d>
-Errors Stepper<d>::weighed() const {
-  Errors out = errors_;
-  out.contact_force *= grazing_;
-  return out;
-}
-
 template class Stepper<2>;
 template class Stepper<3>;
 

@@ -8,7 +8,6 @@
 namespace warmslip {
 namespace {
 
-constexpr const char* beyond_doubles = "a number overflowed; scale the data";
 constexpr const char* unsupported =
     "nothing was found to hold the body in a step without inertia: it may move and touches nothing, slides freely on "
     "what it touches, or is balanced on its points; give it a support, friction or an [inertia] table";
@@ -223,60 +222,6 @@ template <int d>
 Balances Stepper<d>::balance(const StepInputs& inputs) {
   const Timed timed(cost_.balance_seconds);
   return evaluator_.evaluate(now_, next_, inputs);
-}
-
-template <int d>
-bool Stepper<d>::closed(const Balances& l) const {
-  const double bound = options_.balance_bound;
-  return l.heat_residual <= bound && l.force_residual <= bound && l.energy_residual <= bound && l.law_residual <= bound;
-}
-
-// Only a step whose balances close becomes the state.
-template <int d>
-Outcome Stepper<d>::outcome_of(const Balances& l) const {
-  if (!std::isfinite(l.kinetic + l.elastic + l.contact + l.viscous + l.load_work + l.conducted + l.heat_change))
-    return Outcome::not_finite;
-  if (!closed(l)) return Outcome::balance_violated;
-  return weighed().largest() <= options_.error_bound ? Outcome::completed : Outcome::precision_lost;
-}
-
-// Whether PETSc's options put an iterative solver in the place of a factorization.
-template <int d>
-bool Stepper<d>::iterative() const {
-  return (systems_->momentum && layout_.sum(systems_->momentum->bytes()) == 0) ||
-         (systems_->heat && layout_.sum(systems_->heat->bytes()) == 0);
-}
-
-// The reason for which a step is rejected.
-template <int d>
-std::string Stepper<d>::why(Outcome outcome, const Balances& l) const {
-  const double bound = options_.balance_bound;
-  std::string names;
-  const auto list = [&](const char* name) { names += (names.empty() ? "" : " and ") + std::string(name); };
-  switch (outcome) {
-    case Outcome::not_finite:
-      return beyond_doubles;
-    case Outcome::precision_lost:
-      for (const auto& [name, error] :
-           {std::pair{"u", errors_.u}, std::pair{"theta", errors_.theta}, std::pair{"the stress", errors_.stress},
-            std::pair{"the contact force", weighed().contact_force}})
-        if (std::isgreater(error, options_.error_bound)) list(name);
-      return "fewer than four digits of " + names +
-             " can be trusted: the equations are solved to round-off, but their operator is too ill-conditioned for "
-             "double "
-             "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other";
-    case Outcome::balance_violated: {
-      for (const auto& [name, residual] : {std::pair{"energy", l.energy_residual}, std::pair{"heat", l.heat_residual},
-                                           std::pair{"force", l.force_residual}, std::pair{"law", l.law_residual}})
-        if (!(residual <= bound)) list(name);
-      return names + (iterative()
-                          ? " residual above 1e-10 after iterative refinement: the linear solver tolerance is too loose"
-                          : " residual above 1e-10 after iterative refinement: terms of the step cancel beyond double "
-                            "precision; shorten the steps, or bring stiffnesses and lengths nearer to each other");
-    }
-    default:
-      return "";
-  }
 }
 
 template <int d>

@@ -20,6 +20,9 @@ enum class Outcome {
   solver_failed
 };
 
+/// The reason of the outcome `not_finite`.
+inline constexpr const char* beyond_doubles = "a number overflowed; scale the data";
+
 struct StepperOptions {
   double k;  ///< time step, until `set_step` changes it
   Coupling coupling;

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from warmslip.typing import Array
 
@@ -18,6 +17,8 @@ def located(nodes: Array, facets: Any, points: Array) -> tuple[Any, Array]:
 
     `nodes` are (nodes, d), `facets` (facets, d), `points` (points, d).
     """
+    from scipy.spatial import cKDTree  # a tenth of a second, for what draws
+
     corners = nodes[facets]
     facet, shares = np.zeros(len(points), dtype=int), np.zeros((len(points), facets.shape[1]))
     away = np.full(len(points), np.inf)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from warmslip.typing import Array
 
@@ -72,6 +71,8 @@ def staggered_limit(a: Array, f: Array, m: Array, r: Array, rate: float) -> floa
     if most <= 0:
         return 0.0
     enough = 2 * bounds(load)[1] / (least if least > ZERO * most else ZERO * most)
+    from scipy.optimize import brentq  # a tenth of a second, for few scenes
+
     return 1 / float(brentq(margin, 0.0, enough, xtol=1e-300, rtol=1e-14)) if margin(enough) > 0 else 0.0
 
 

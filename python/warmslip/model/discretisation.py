@@ -17,23 +17,20 @@ from warmslip._core import stress as cell_stress
 from warmslip._core import stress_out_of_plane as cell_stress_out_of_plane
 from warmslip.messages import Shown, quoted
 from warmslip.model.contact_laws import CheckedLaw, Law
+from warmslip.model.initial import initial_fields
 from warmslip.model.load_vectors import LoadVectors
-from warmslip.model.loads import Loads, data, evaluate
+from warmslip.model.loads import Loads
 from warmslip.model.materials import contact_part, materials, of_dim
 from warmslip.model.meshes import make_mesh
-from warmslip.model.point_location import interpolated
 from warmslip.model.prescribed import PrescribedContact
+from warmslip.model.stress import von_mises
 from warmslip.model.supports import Supports, part_springs, supports
-from warmslip.scene import initial_state
 from warmslip.scene.full import FullScene, full_model
 from warmslip.scene.scene import Scene
 from warmslip.scene.structure import structure
 from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
-
-FITS = 1e-6  # relative to the displacement: how far supports may be from the state that a run begins with
-NEAR = 0.5  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,52 +122,7 @@ class Discretisation(Shown):
                 backend=getattr(Backend, backend),
                 contact=options,
             )
-        x, initial = np.asarray(self.mesh.nodes), scene.initial
-
-        if initial.run is not None:
-            u, w, theta = self._stored(initial.run, initial.time)
-            self._fits_supports(initial.run, u)
-            return self.restart(stepper, u, w, theta, 0.0)
-
-        def start(name: str, components: int) -> Array:
-            value = getattr(initial, name)
-            return evaluate(data(value) if value is not None else 0.0, x, 0.0, components, f"initial.{name}")
-
-        return self.restart(
-            stepper,
-            start("displacement", self.dim),
-            start("velocity", self.dim),
-            start("temperature", 1)[:, 0],
-            0.0,
-        )
-
-    def _fits_supports(self, run: str, u: Array) -> None:
-        """Raises ValueError for a displacement that the supports would change at once."""
-        supports = self.load_vectors.supports
-        if not len(supports.nodes):
-            return
-        off = np.abs(u[supports.nodes] - supports.released(u[supports.nodes]) - self.load_vectors.displacement(0.0))
-        if off.max() > FITS * max(np.abs(u).max(), 1e-300):
-            raise ValueError(
-                f"initial.from: at t = 0 the supports are up to {off.max():.3g} away from where the state in '{run}' has them; "
-                "let them begin there, as in top = ['0.1 - 0.1 * t', 0.0]"
-            )
-
-    def _stored(self, run: str, time: float | None) -> tuple[Array, Array, Array]:
-        """The fields of a stored state on this mesh; zero where the other run has none."""
-        found, x = initial_state.read(run, time), np.asarray(self.mesh.nodes)
-        same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, self.mesh.cells)
-        none = {"u": np.zeros_like(x), "w": np.zeros_like(x), "theta": np.zeros(len(x))}
-        out = []
-        for name, zero in none.items():
-            values = getattr(found, name)
-            if values is None:
-                out.append(zero)
-            elif found.nodes.shape[1] != self.dim:
-                raise ValueError(f"initial.from: '{run}' has {found.nodes.shape[1]} dimensions; give one of {self.dim}")
-            else:
-                out.append(values if same else interpolated(values, found.nodes, found.cells, x, NEAR))
-        return out[0], out[1], out[2]
+        return self.restart(stepper, *initial_fields(scene, self.mesh, self.load_vectors), 0.0)
 
     def law(self, part: str) -> Any:
         """The `_core.ContactLaw` of a contact part."""
@@ -435,42 +387,3 @@ def _finished(
         like,
         {} if known is None else known,
     )
-
-
-def stress_measures(d: Discretisation, stepper: Any) -> dict[str, float]:
-    """L2 norm and maximum of the von Mises stress of a stepper's state, at the cells' centroids (collective)."""
-    mises = d.mises(stepper)
-    volume = d.volumes
-    return {"mises_L2": float(np.sqrt(volume @ mises**2)), "mises_max": float(mises.max())}
-
-
-def von_mises(stress: Array, zz: Array | None = None) -> Array:
-    """Von Mises stress sqrt(3/2 s:s), with s the deviator of the stress.
-
-    Parameters
-    ----------
-    stress : array (cells, d, d)
-        Cauchy stress, of cells or of nodes.
-    zz : array (cells,), optional
-        Stress along z of a body in the plane, 0 unless given. Shear stresses along z are 0.
-
-    Returns
-    -------
-    array (cells,)
-        Von Mises stress.
-
-    Raises
-    ------
-    ValueError
-        For stresses of another shape.
-    """
-    if stress.ndim != 3 or stress.shape[1:] not in ((2, 2), (3, 3)):
-        raise ValueError(f"stress: the shape is {stress.shape}; give (cells, d, d) with d = 2 or 3")
-    full = np.zeros((len(stress), 3, 3))
-    d = stress.shape[1]
-    full[:, :d, :d] = stress
-    if zz is not None:
-        full[:, 2, 2] = zz
-    deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    with np.errstate(over="ignore"):  # a run that overflowed is drawn as far as it came
-        return np.asarray(np.sqrt(1.5 * np.einsum("cij,cij->c", deviator, deviator)))

@@ -87,7 +87,7 @@ class LoadVectors:
         _refuse_unused(scene, loads)
         self._surface, self._loads, self._comm, self._dim = surface, loads, comm, dim
         self._nodes, self._layout, self._step = np.asarray(mesh.nodes), layout, scene.step
-        self._supports = supports
+        self.supports = supports
         self._cooled = {part: np.unique(mesh.parts[part]) for part in scene.supports.temperature}
         moves, conducts = scene.moves, scene.heat is not None
         quadrature = LoadQuadrature2 if dim == 2 else LoadQuadrature3
@@ -150,7 +150,7 @@ class LoadVectors:
         """Whether any datum changes in time."""
         given = [*self._loads.temperature.values()]
         given += [self._loads.on_contact(name, i) for i in self._points for name in ON_CONTACT]
-        return bool(self._moving) or self._supports.of_time or any(map(of_time, given))
+        return bool(self._moving) or self.supports.of_time or any(map(of_time, given))
 
     def _try(self, t: float) -> None:
         """Calls the functions in Python of the first step: one that is wrong is refused here, and not the outcome of a run."""
@@ -208,14 +208,9 @@ class LoadVectors:
             return ShapeGap(value, np.asarray(self._surface.normals)[self._points[number]])
         return value
 
-    @property
-    def supports(self) -> Supports:
-        """What holds the body."""
-        return self._supports
-
     def displacement(self, t: float) -> Array:
         """The given displacement of the nodes of `supports` at time t, (n, d), length; zero in free directions."""
-        return self._supports.displacement(t, self._together)
+        return self.supports.displacement(t, self._together)
 
     def temperature(self, t: float) -> list[tuple[Any, Array]]:
         """The given temperature at time t, part by part: nodes (n,) and values (n,)."""
@@ -233,7 +228,7 @@ class LoadVectors:
         if self._velocity is None:
             return None
         values = np.zeros((len(self._nodes), self._dim))
-        values[self._supports.nodes] = (self.displacement(t) - self.displacement(t - step)) / step
+        values[self.supports.nodes] = (self.displacement(t) - self.displacement(t - step)) / step
         self._layout.distribute(values.ravel(), self._velocity)
         return self._velocity
 

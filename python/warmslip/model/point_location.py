@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from warmslip.typing import Array
 
@@ -26,6 +25,8 @@ def located(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> tu
 
 def cells_of(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> tuple[Any, Array]:
     """As `located`, with the cell -1 for a point outside."""
+    from scipy.spatial import cKDTree  # a tenth of a second, for few scenes
+
     corners = nodes[cells]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
     tree = cKDTree(corners.mean(axis=1))

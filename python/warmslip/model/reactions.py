@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from warmslip.model.discretisation import Discretisation
-from warmslip.model.supports import Supports
+from warmslip.model.supports import ALIKE, Supports
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
-
-SAME = 1e-6  # what is left of a unit direction beside others that it depends on
 
 
 class Reactions:
@@ -97,7 +95,7 @@ def _shares(supports: Supports, names: list[str]) -> tuple[Any, Any, Array]:
     for m in np.unique(count):
         forms = first[count == m][:, None] + np.arange(m)
         chosen = directions[forms] * _independent(directions[forms])[..., None]
-        shares[forms] = np.einsum("nma,nbm->nmab", chosen, np.linalg.pinv(chosen, rcond=SAME))
+        shares[forms] = np.einsum("nma,nbm->nmab", chosen, np.linalg.pinv(chosen, rcond=ALIKE))
     return nodes, number, shares
 
 
@@ -107,8 +105,8 @@ def _independent(directions: Array) -> Array:
     for i in range(directions.shape[1]):
         rest = directions[:, i] - np.einsum("nja,njb,nb->na", basis, basis, directions[:, i])
         size = np.linalg.norm(rest, axis=1)
-        out[:, i] = size > SAME
-        basis[:, i] = rest / np.where(size > SAME, size, np.inf)[:, None]
+        out[:, i] = size > ALIKE
+        basis[:, i] = rest / np.where(size > ALIKE, size, np.inf)[:, None]
     return out
 
 

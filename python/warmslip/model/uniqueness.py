@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
-from scipy.optimize import minimize
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from warmslip.typing import Array
@@ -216,6 +215,8 @@ def bound(points: ContactPoints, *, enough: float = np.inf) -> float:
 
     tries = int(TRIES * min(1.0, (2 * DENSE / 3 / form.size) ** 2))
     first = np.repeat(np.log([start[0], 1.0, start[1]]), n)
+    from scipy.optimize import minimize  # a tenth of a second, for few scenes
+
     minimize(
         target,
         first,

@@ -44,7 +44,7 @@ class ShapeTable(Table):
                 raise ValueError(f"a {self.shape} needs its {name}; give one")
             if value is not None and name not in known:
                 raise ValueError(f"a {self.shape} has no {name}; leave it out")
-            if isinstance(value, list) and not any(value):  # of zeros
+            if isinstance(value, list) and not any(value):
                 raise ValueError(f"{name} is the zero vector, which has no direction; give one")
         for value in self.at:
             if isinstance(value, str) and set(Expression(value).names) & set("xyz"):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+from functools import lru_cache
 from typing import Any, Self
 
 from pydantic import ValidationError, model_validator
 
 from warmslip.mesh import files
 from warmslip.messages import Shown, quoted
-from warmslip.scene import initial_state
 from warmslip.scene.errors import refusal, validated
 from warmslip.scene.overrides import replace
 from warmslip.scene.tables import SceneTables
@@ -58,14 +59,13 @@ class Scene(Shown, SceneTables):
         return self._hash(kept | {"step": f"{self.step:.10e}"})
 
     def _hash(self, tables: dict[str, Any]) -> str:
-        initial = {
-            key: value for key, value in tables.get("initial", {}).items() if key != "from"
-        }  # its content counts
+        # of the run that it begins with, the content counts and not the path
+        initial = {key: value for key, value in tables.get("initial", {}).items() if key != "from"}
         data = json.dumps(tables | {"initial": initial}, sort_keys=True)
         if self.mesh.file is not None:
             data += files.read(self.mesh.file).digest
         if self.initial.run is not None:
-            data += initial_state.digest(self.initial.run)
+            data += _content(self.initial.run)
         return hashlib.sha256(data.encode()).hexdigest()[:16]
 
     def override(self, **values: Any) -> Self:
@@ -79,3 +79,17 @@ class Scene(Shown, SceneTables):
         for key, value in values.items():
             replace(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
         return validated(data, type(self))
+
+
+def _content(path: str) -> str:
+    """A hash of a file, "" where there is none."""
+    try:
+        return _content_of(path, os.stat(path).st_mtime_ns)
+    except OSError:
+        return ""
+
+
+@lru_cache(maxsize=8)
+def _content_of(path: str, _: int) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]

@@ -16,7 +16,8 @@ import numpy as np
 from mpi4py import MPI
 
 from warmslip._core import compiler, petsc_version
-from warmslip.model.discretisation import Discretisation, discretise, stress_measures
+from warmslip.model.discretisation import Discretisation, discretise
+from warmslip.model.stress import stress_measures
 from warmslip.records import provenance
 from warmslip.scene.errors import SceneError
 from warmslip.scene.scene import Scene
@@ -63,7 +64,7 @@ def row(simulation: Simulation, errors: dict[str, float] | None) -> dict[str, An
         | {"outcome": simulation.outcome}
         | {f"residual_{name}": simulation.statistics.residuals[name] for name in BALANCES}
         | run_numbers.norms(simulation)
-        | stress_measures(d, s)
+        | stress_measures(d.mises(s), d.volumes)
         | run_numbers.contact(simulation)
         | {
             "newton_largest": simulation.statistics.newton_max,

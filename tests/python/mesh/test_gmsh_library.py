@@ -19,7 +19,7 @@ try:
 except (ImportError, OSError) as error:  # OSError: a system library of its graphics is missing
     pytest.skip(f"gmsh's Python package cannot be loaded: {error}", allow_module_level=True)
 
-from support import gmsh_corpus
+from support import gmsh_corpus, gmsh_files
 from support.gmsh_corpus import CASES, REFUSED
 
 SAID = {  # of remarks and notes; numbers of cells are those of gmsh's version
@@ -43,7 +43,7 @@ def library() -> Iterator[None]:
 
 @pytest.mark.parametrize("case", CASES, ids=[case.__name__ for case in CASES])
 def test_the_same_mesh_or_one_true_sentence(case: Callable[[], Any], tmp_path: Path) -> None:
-    paths = list(gmsh_corpus.write(case, tmp_path))
+    paths = list(gmsh_files.write(case, tmp_path))
     assert len(paths) == 8
     for path in paths:
         if words := _refusal(case.__name__, path.name):
@@ -62,7 +62,7 @@ def _refusal(case: str, file: str) -> str:
 
 
 def _compare(case: str, path: Path) -> None:
-    ours, theirs = files.read(str(path)), gmsh_corpus.read(path)
+    ours, theirs = files.read(str(path)), gmsh_files.read(path)
     assert ours.dim == theirs.dim
     places = np.zeros((len(ours.nodes), 3))
     places[:, : ours.dim] = ours.nodes
@@ -94,7 +94,7 @@ def _boundary(mesh: files.MeshFile) -> list[Any]:
 
 def _same_places(places: Any, simplices: Any, elements: set[frozenset[Any]]) -> bool:
     """Whether simplices are the elements, or lie each in one of them and together in all."""
-    found = {frozenset(map(tuple, corners)) for corners in gmsh_corpus.rounded(places)[simplices].tolist()}
+    found = {frozenset(map(tuple, corners)) for corners in gmsh_files.rounded(places)[simplices].tolist()}
     if {len(element) for element in elements} == {simplices.shape[1]}:
         return found == elements and len(found) == len(simplices)
     inside: dict[Any, set[frozenset[Any]]] = {}
@@ -115,7 +115,7 @@ def test_the_table_of_elements_is_that_of_gmsh() -> None:
 
 def test_a_file_cut_anywhere_is_refused(tmp_path: Path) -> None:
     """Neither text nor binary is read as a smaller mesh."""
-    for path in gmsh_corpus.write(gmsh_corpus.plain, tmp_path):
+    for path in gmsh_files.write(gmsh_corpus.plain, tmp_path):
         whole = path.read_bytes()
         if _refusal("plain", path.name):
             continue

@@ -12,9 +12,10 @@ from petsc4py import PETSc
 from reference import scipy_scheme
 
 from warmslip import _core
-from warmslip.model.discretisation import discretise, von_mises
+from warmslip.model.discretisation import discretise
 from warmslip.model.loads import Loads, evaluate
 from warmslip.model.meshes import make_mesh
+from warmslip.model.stress import von_mises
 from warmslip.scene.reader import load
 from warmslip.scene.scene import Scene
 
