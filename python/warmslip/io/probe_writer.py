@@ -62,15 +62,16 @@ class ProbeWriter:
 
     def _cut(self, path: Path, probe: Probe, keep: int) -> None:
         """Takes away the rows after step `keep`, and the rest of a row that a killed run left."""
-        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+        if not path.exists():
+            return  # of a probe that the run had not, or of steps before the first row
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = [line for line in lines[1:] if line.endswith("\n") and _step(line) <= keep]
-        due = keep // probe.every * len(probe.positions)
-        if len(kept) != due:
+        if not _reaches([_step(line) for line in kept], keep, len(probe.positions)):
             raise ValueError(
                 f"{path} ends before the checkpoint, or is not of this run; run from the start, without --resume"
             )
-        if not due:
-            path.unlink(missing_ok=True)
+        if not kept:
+            path.unlink()
             return
         part = path.with_suffix(".part")
         part.write_text("".join([lines[0], *kept]), encoding="utf-8")
@@ -113,6 +114,15 @@ class ProbeWriter:
     ) -> None:
         with contextlib.suppress(OSError) if kind is not None else contextlib.nullcontext():
             self.write()
+
+
+def _reaches(steps: list[float], keep: int, points: int) -> bool:
+    """Whether rows with these step numbers hold all that was due up to step `keep`; runs before may have had another cadence."""
+    found, count = np.unique(steps, return_counts=True)
+    if not len(found):
+        return True
+    gap = found[-1] - (found[-2] if len(found) > 1 else 0)
+    return bool((count == points).all() and found[-1] + gap > keep)
 
 
 def _step(line: str) -> float:

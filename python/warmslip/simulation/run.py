@@ -142,13 +142,14 @@ def run(
         if ended := _ended(simulation, folder):
             return ended
         begin = simulation.resume(folder)
-        _clear(folder)
     minutes, saved = scene.output.checkpoint_minutes, time.monotonic()
     with (
         Interruption() as stop,
         TrajectoryWriter(path, simulation.discretisation, simulation.stepper, simulation.comm, keep=begin) as writer,
         ProbeWriter(folder, probing, simulation.comm, keep=begin) as probe_writer,
     ):
+        if resume and folder is not None:
+            _clear(folder)  # all that goes on is there
         for state, report in simulation.steps():
             writer.step(report, simulation.taken)
             probe_writer.step(state)

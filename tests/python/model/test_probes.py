@@ -233,6 +233,29 @@ def test_a_table_that_lacks_rows_is_not_gone_on_with(tmp_path: Path) -> None:
         warmslip.run(one, out=tmp_path, resume=True)
 
 
+def test_a_run_that_goes_on_may_change_its_probes(tmp_path: Path) -> None:
+    """To a later end with another cadence and one more probe, and on from there once more."""
+    one = square({"point": POINT | {"every": 5}}, time__steps=12, time__end=1.2)
+    warmslip.run(one, out=tmp_path)
+    for steps, end in ((20, 2.0), (23, 2.3)):
+        probes = {"point": POINT | {"every": 2}, "new": POINT}
+        longer = one.override(**{"time.steps": steps, "time.end": end, "output.probes": probes})
+        assert warmslip.run(longer, out=tmp_path, resume=True).completed
+    assert [int(row["step"]) for row in table(tmp_path, "point")] == [5, 10, 14, 16, 18, 20, 22]
+    assert [int(row["step"]) for row in table(tmp_path, "new")] == list(range(13, 24))
+
+
+def test_what_cannot_go_on_keeps_its_summary(tmp_path: Path) -> None:
+    one = square({"point": POINT}, time__steps=4, time__end=0.4)
+    warmslip.run(one, out=tmp_path)
+    path = tmp_path / "probes/point.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
+    with pytest.raises(ValueError, match="ends before the checkpoint"):
+        warmslip.run(one.override(**{"time.steps": 8, "time.end": 0.8}), out=tmp_path, resume=True)
+    assert (tmp_path / "summary.json").exists()
+    assert (tmp_path / "final.vtu").exists()
+
+
 def test_a_new_run_has_no_table_of_an_earlier_one(tmp_path: Path) -> None:
     warmslip.run(square({"point": POINT, "other": POINT}), out=tmp_path)
     warmslip.run(square({"point": POINT}, time__steps=2), out=tmp_path)
