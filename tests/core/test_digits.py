@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from support.boxes import along, elasticity, field, scene
+from support.boxes import along, elasticity, field, forces_of, scene, turned
 from support.ranked import Checks
 
+from warmslip import discretise
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.summary import summary
 
@@ -90,6 +91,34 @@ def rounding_of_a_motion_that_is_over(d: int) -> None:
             simulation = leaps(way, coupling)
             error = np.abs(field(simulation, "theta") - still).max() / np.abs(still).max()
             assert error <= 10 ** (1 - summary(simulation)["digits"]["theta"]), (coupling, way, error)
+
+
+@check
+def rounding_of_a_slide_along_an_oblique_foundation(d: int) -> None:
+    """Axes that are askew to the foundation press a sliding body into it by rounding, and the run says how much."""
+    turn = np.linalg.qr(np.array([[0.8, -0.6, 0.1], [0.5, 0.7, -0.3], [0.2, 0.4, 0.9]])[:d, :d])[0]
+    turn *= np.linalg.det(turn) if d == 3 else [np.linalg.det(turn), 1.0]
+    for stiffness in (1e3, 1e6, "rigid"):
+        found = []
+        for axes in (np.eye(d), turn):
+            still = scene(
+                d,
+                2,
+                time={"end": 60.0, "steps": 30},
+                elasticity=elasticity(d, 100.0, 0.3),
+                inertia={"density": 1.0},
+                initial={"velocity": (axes @ along(d, 0.0, 10.0)).tolist()},
+                loads={"body": along(d, -1.0)},
+                contact={"part": "bottom", "stiffness": stiffness, "friction": {"coefficient": 0.2}},
+            )
+            one, mesh = turned(still, axes)
+            simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
+            found.append([forces_of(simulation) @ axes for _ in simulation.steps()])
+            assert simulation.outcome == "completed", simulation.failure
+            stated = summary(simulation)["digits"]["contact_force"]
+        straight, askew = np.array(found)
+        error = np.abs(askew - straight).max() / np.abs(straight).max()
+        assert error <= 10 ** (2 - stated), (stiffness, error, stated)  # errors of 30 steps add up
 
 
 @check

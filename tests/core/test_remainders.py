@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.boxes import along, completed, elasticity, field, forces_of, scene
+from support.boxes import along, completed, elasticity, field, forces_of, scene, turned
 from support.ranked import Checks
 
+from warmslip import discretise
 from warmslip.simulation.simulation import Simulation
 
 check = Checks()
@@ -314,6 +315,42 @@ def pressures_on_a_rigid_foundation(d: int) -> None:
         nodal = np.linalg.lstsq(linear[bears], pressing[bears], rcond=None)[0]
         assert bears.sum() > linear.shape[1]
         assert np.abs(linear[bears] @ nodal - pressing[bears]).max() <= 1e-9 * pressing.max()
+
+
+@check
+def forces_beside_a_wall_that_is_never_touched(d: int) -> None:
+    """A block that flies along its foundation towards a wall 15 km away presses as it does without the wall."""
+    turn = np.linalg.qr(np.array([[0.8, -0.6, 0.1], [0.5, 0.7, -0.3], [0.2, 0.4, 0.9]])[:d, :d])[0]
+    turn *= np.linalg.det(turn) if d == 3 else [np.linalg.det(turn), 1.0]
+    laws: list[dict[str, Any]] = [{"stiffness": 1e9}, {"stiffness": 1e12, "exponent": 1.5}, {"stiffness": "rigid"}]
+    # axes that are askew mix the flight into the depths, whose rounding is 1e-13 of it
+    for law, axes, share in [*((law, np.eye(d), 1e-7) for law in laws), (laws[1], turn, 1e-5)]:
+        floor = {"part": "bottom", "friction": {"coefficient": 0.3}} | law
+        found = []
+        for walls in ([], [{"part": "left", "stiffness": 1e9, "gap": 15000.0}]):
+            falls = scene(
+                d,
+                2,
+                time={"end": 10.0, "steps": 5},
+                elasticity=elasticity(d, **STEEL),
+                inertia={"density": 7800.0},
+                initial={"velocity": (axes @ along(d, 0.0, -140.0)).tolist()},
+                loads={"body": along(d, 0.0)},
+                contact=[floor, *walls],
+            )
+            one, mesh = turned(falls, axes)
+            place = " + ".join(f"({a!r}) * {x}" for a, x in zip(axes[:, 0].tolist(), "xyz", strict=False))
+            pull = (axes @ along(d, -1.0)).tolist()
+            one = one.override(**{"loads.traction.top": [f"({a!r}) * (1 + sin(3 * t) + {place})" for a in pull]})
+            simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
+            forces = []
+            for _ in simulation.steps():
+                bears = np.asarray(simulation.discretisation.surface.contacts) == 0
+                forces.append(forces_of(simulation)[bears])
+            assert simulation.outcome == "completed", simulation.failure
+            found.append(np.array(forces))
+        error, size = np.abs(found[1] - found[0]).max(), np.abs(found[0]).max()
+        assert error <= share * size, (law, error / size)
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

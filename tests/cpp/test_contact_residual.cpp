@@ -182,3 +182,17 @@ TEST_CASE_TEMPLATE("a pull and a depth of rounding on a rigid foundation are a r
         CHECK(found <= 1e-13);
     }
 }
+
+TEST_CASE_TEMPLATE("a flight and a distant wall excuse no force", D, Two, Three) {
+  constexpr int d = D::value;
+  const Point<d> down = -Point<d>::Unit(d - 1), west = -Point<d>::Unit(0);
+  const double k = 2, stiffness = 1e9, depth = 1e-9;
+  ContactProblem<d> problem{{{{stiffness}, {0.0}}}, k, {}, Eigen::VectorXd::Zero(2 * d)};
+  problem.points = {{down, 0.5, depth, depth * down, 0}, {west, 0.5, -15000, Point<d>::Zero(), 15000}};
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(2 * d), velocity(2 * d);
+  velocity << 140 * west, 140 * west;
+  problem.free = velocity;
+  force.head<d>() = 0.5 * stiffness * depth * down;
+  CHECK(law_residual<d>(problem, force, velocity) <= 1e-15);
+  CHECK(law_residual<d>(problem, 1.001 * force, velocity) >= 1e-4);
+}

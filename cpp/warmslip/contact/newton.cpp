@@ -233,6 +233,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
   Linearisation at = linearise(problem, solution.added, solution.rigid);
   const Eigen::Index all = compliance_.rows();
   ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
+  double best_rest = 0;     // what its forces leave of their own equations
   std::vector<int> tried;   // statuses of the step before
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
@@ -249,15 +250,23 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
-      const bool enough = solution.law_residual <= 1e-2 * options_.tolerance ||
-                          (best.converged && !(solution.law_residual < 0.9 * best.law_residual));
-      if (!best.converged || solution.law_residual < best.law_residual) best = solution;
+      // beside large motions the law's residual says little of small forces
+      const double rest = at.value.head(all).norm();
+      const bool settled = rest <= 1e-10 * solution.force.norm(), nearer = rest < 0.5 * best_rest;
+      const bool helped = !best.converged || (settled ? solution.law_residual < 0.9 * best.law_residual : nearer);
+      if (!best.converged || solution.law_residual < best.law_residual || nearer) {
+        best = solution;
+        best_rest = rest;
+      }
       best.converged = true;
-      if (enough) break;
+      if (!helped || (settled && solution.law_residual <= 1e-2 * options_.tolerance)) break;
     } else if (best.converged) {
       break;
     }
-    if (step >= options_.newton_steps && !best.converged) return false;
+    if (step >= options_.newton_steps) {
+      if (best.converged) break;
+      return false;
+    }
     factor(problem, at, solution);
     const Eigen::VectorXd change = direction(at);
     if (!change.allFinite() || (solution.unsupported && spring_ == 0)) {

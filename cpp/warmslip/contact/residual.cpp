@@ -23,7 +23,8 @@ double distance(const NormalCompliance& law, double pressure, double r) {
 
 template <int d>
 double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
-  double largest = 0, reach = 0, max_speed = 0, max_bound = 0;
+  double largest = 0, max_speed = 0, max_bound = 0;
+  Point<d> motion = Point<d>::Zero();  // the largest terms of the displacements, component by component
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
     if (point.prescribed) continue;
@@ -31,15 +32,14 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at),
                    free = problem.free.template segment<d>(at);
     const double speed = (w - w.dot(point.normal) * point.normal).norm(), lambda = f.dot(point.normal);
-    const auto along = [&](const Point<d>& v) { return v.cwiseAbs().dot(point.normal.cwiseAbs()); };
     // the velocity is what the contact force leaves of the free one
-    reach = std::max(reach, along(point.displacement) + std::abs(point.gap) + problem.step * (along(w) + along(free)));
+    motion = motion.cwiseMax(point.displacement.cwiseAbs() + problem.step * (w.cwiseAbs() + free.cwiseAbs()));
     max_speed = std::max({max_speed, free.norm(), w.norm()});
     largest = std::max(largest, f.norm());
     max_bound = std::max(
         max_bound, point.weight * problem.law(i).friction.bound(std::max(lambda, 0.0) / point.weight, speed).value);
   }
-  if (!force.allFinite() || !std::isfinite(reach) || !std::isfinite(max_speed))
+  if (!force.allFinite() || !motion.allFinite() || !std::isfinite(max_speed))
     return std::numeric_limits<double>::infinity();
   largest = std::max(largest, max_bound);
   double worst = 0;
@@ -49,6 +49,8 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     const auto at = static_cast<Eigen::Index>(i) * d;
     const Point<d> f = force.template segment<d>(at), w = velocity.template segment<d>(at);
     const double r = point.penetration + problem.step * w.dot(point.normal), lambda = f.dot(point.normal);
+    const double reach = motion.dot(point.normal.cwiseAbs()) + std::abs(point.gap);
+    if (!std::isfinite(reach)) return unlimited;
     const Point<d> f_tau = f - lambda * point.normal, w_tau = w - w.dot(point.normal) * point.normal;
     const double bound = point.weight * law.friction.bound(std::max(lambda, 0.0) / point.weight, w_tau.norm()).value;
     if (point.prescribed && law.compliance.rigid()) {  // it bears no pressure, and may be in by rounding alone

@@ -1,6 +1,7 @@
 // Iterative refinement of a step, contact included, and how many digits of it can be trusted.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "warmslip/time/stepper.hpp"
 
@@ -57,7 +58,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     posed_.rigid = rigid_load_;
     posed_.free = posed_.known_velocity + systems_->contact->compliance() * contact.force;
     again = contact;
-    if (!(apply ? solve_contact(contact.force, again) : respond(correction + creep(contact), again))) return false;
+    if (!(apply ? solve_contact(contact.force, again)
+                : respond(correction + creep(contact) + rounding(velocity), again)))
+      return false;
     if (apply) free_ = posed_.free;
     change = again;
     change.force = again.added;
@@ -177,6 +180,18 @@ Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
                         posed_.law(static_cast<std::size_t>(i)).friction.regularisation == 0;
     slip -= slip.dot(nu) * nu;
     if (!sticks || slip.norm() > tolerated) slip.setZero();  // without a bound it sticks and slips as it likes
+  }
+  return out;
+}
+
+// What rounding does to the velocities of the points along their normals, (d points), to one side and the other in
+// turn: a body that slides fast along an oblique foundation is pressed into it by rounding.
+template <int d>
+Eigen::VectorXd Stepper<d>::rounding(const Eigen::VectorXd& velocity) const {
+  Eigen::VectorXd out(velocity.size());
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const Point<d> nu = surface_.normals().row(i).transpose(), size = velocity.segment<d>(i * d).cwiseAbs();
+    out.segment<d>(i * d) = (i % 2 ? 1 : -1) * std::numeric_limits<double>::epsilon() * size.dot(nu.cwiseAbs()) * nu;
   }
   return out;
 }

@@ -293,6 +293,11 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balan
   if (report.outcome != Outcome::completed) return report;
 
   for (Extent* field : extents_.all()) field->change = std::max(field->change, field->tried);
+  if (systems_->contact && contact.force.size()) {  // few steps estimate errors, and the largest force may be in any
+    Extent& forces = extents_.contact_force;
+    forces.size = std::max(forces.size, contact.force.template lpNorm<Eigen::Infinity>());
+    forces.scale = std::max(forces.scale, forces.size);
+  }
   report.stage = contact.stage;
   report.newton_iterations = contact.iterations;
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {

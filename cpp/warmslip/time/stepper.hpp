@@ -204,6 +204,7 @@ class Stepper {
   Motion motion_of(const ContactSolution<d>& contact) const;
   void undo(const Motion& motion, ContactSolution<d>& contact);
   Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
+  Eigen::VectorXd rounding(const Eigen::VectorXd& velocity) const;
   Eigen::VectorXd sliding(Vec w) const;
   void note_temperature(const Balances& balances);
   void add_heat_of_error(const StepLoads& loads);

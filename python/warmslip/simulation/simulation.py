@@ -216,7 +216,7 @@ class Simulation(Shown):
 
     def warnings(self) -> list[str]:
         """What solves the equations and is hardly sensible, so far (collective)."""
-        return self.monitor.sentences(self.report is not None, self.statistics)
+        return self.monitor.sentences(self.taken > 0, self.statistics)
 
     def take_checkpoint(self) -> Checkpoint:
         """The state after the last step; the stepper forgets what a resumed one cannot know (collective)."""

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from support.processes import child_environment
+from support.stopped import KilledError, stop_after
 
 import warmslip
 from warmslip.simulation.simulation import Simulation
@@ -44,6 +45,19 @@ def test_a_later_end(tmp_path: Path, keys: dict[str, Any]) -> None:
                 assert np.array_equal(values, other.series(group)[name]), name
         assert other.time[-1] == 1.0
         assert np.all(np.diff(other.time) > 0)
+
+
+def test_a_run_that_stops_at_once_says_what_it_said(tmp_path: Path) -> None:
+    """A large strain, an interruption, then a load without a value: the run stops where it goes on, with its warnings."""
+    keys = {"loads.body": [0.0, -20.0], "viscosity.lame": [0.1, 0.1], "output.checkpoint": 1}
+    broken = scene(**{"loads.traction.left": ["sqrt(0.4 - t)", 0.4], **keys})
+    whole = warmslip.run(broken)
+    with pytest.raises(KilledError):
+        warmslip.run(broken, out=tmp_path, progress=stop_after(whole.summary["steps"]))
+    again = warmslip.run(broken, out=tmp_path, resume=True)
+    assert whole.outcome == again.outcome == "data_not_finite"
+    assert any("strain" in one for one in whole.summary["warnings"])
+    assert again.summary["warnings"] == whole.summary["warnings"]
 
 
 def test_an_end_that_is_past_is_refused(tmp_path: Path) -> None:
