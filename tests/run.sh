@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# All tests: the C++ ones on one and two processes (ctest), then the Python ones. Arguments go to pytest.
+# All tests: the C++ ones on one and two processes (ctest), then the Python ones, those that start MPI after the others and
+# one at a time. Arguments go to pytest, which then runs what they ask for, one test at a time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 bash workflows/setup.sh
@@ -7,4 +8,6 @@ bash workflows/setup.sh
 cmake --preset release >/dev/null
 cmake --build --preset release
 ctest --preset release
-python -m pytest "$@"
+(($#)) && exec python -m pytest "$@"
+python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile -m "not mpi"
+python -m pytest -m mpi

@@ -224,6 +224,38 @@ def springs_and_dashpots_are_what_they_say(d: int) -> None:
 
 
 @check
+def weak_and_stiff_springs(d: int) -> None:
+    """Springs that only keep a pressed body from sliding away leave its weight to the contact; stiff ones guide it.
+
+    The axes may lie askew to the body: rounding of a force along one side is then part of that along the other.
+    """
+    turn = np.linalg.qr(np.array([[0.8, -0.6, 0.1], [0.5, 0.7, -0.3], [0.2, 0.4, 0.9]])[:d, :d])[0]
+    turn *= np.linalg.det(turn) if d == 3 else [np.linalg.det(turn), 1.0]
+    sides = [*SIDES[d], *(["right"] if d == 2 else ["right", "back"])]
+    contact = {"part": "bottom", "stiffness": 1e3, "friction": {"coefficient": 0.3}}
+    cases: list[tuple[dict[str, float], float]] = [
+        ({"stiffness": 10.0**-n}, 1e-3) for n in ((4, 5, 6) if d == 2 else (4, 5))
+    ]
+    for spring, share in [*cases, ({"normal_stiffness": 1e6}, 1e-9)]:
+        ends = []
+        for axes in (np.eye(d), turn):
+            one = pressed(
+                d,
+                {},
+                n=4 if d == 2 else 3,
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"springs": dict.fromkeys(sides, spring)},
+                loads={"body": along(d, -0.01, 0.003)},
+                contact=contact,
+            )
+            there, mesh = turned(one, axes)
+            simulation = completed(there, digits=7.0, mesh=mesh)
+            assert simulation.report.normal_force == pytest.approx(0.01, rel=share)
+            ends.append(field(simulation, "u") @ axes)
+        assert np.abs(ends[1] - ends[0]).max() <= 1e-7 * np.abs(ends[0]).max(), spring
+
+
+@check
 def what_supports_leave_free_is_seen(d: int) -> None:
     """A body without inertia that its rollers let slide is refused; with inertia it slides."""
     sliding = pressed(d, {"bottom": along(d, 0.0, "free") if d == 2 else ["free", "free", 0.0]})

@@ -117,6 +117,8 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   const Point<d>& nu = point.normal;
   const Tensor2<d> normal = nu * nu.transpose();
   const Tensor2<d> tangential = Tensor2<d>::Identity() - normal;
+  // what rounding of a large vector leaves along the normal is no part of a small one across it
+  const auto across_normal = [&](const Point<d>& v) -> Point<d> { return tangential * (tangential * v).eval(); };
   const double r = point.penetration + k * velocity.dot(nu), lambda = force.dot(nu), beta = 1 / compliance.tangential;
   const NormalResidual across = normal_residual(law.compliance, point.weight, compliance.normal, lambda, r);
   const Point<d> slip = tangential * velocity;
@@ -140,7 +142,7 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
   if (bound <= 0 || (!out.touching && law.friction.cohesion <= 0 && !law.friction.custom)) {  // no friction
     out.status = out.touching ? Status::slip : Status::open;
     out.smooth = true;
-    out.value += tangential * force;
+    out.value += across_normal(force);
     out.by_force += tangential;
   } else if (!smooth && size <= bound) {
     out.status = Status::stick;
@@ -164,7 +166,7 @@ PointResidual<d> residual(const ContactLaw& law, const ContactPoint<d>& point, d
     Tensor2<d> turn = follows * (direction * direction.transpose());
     const double turns = size > 0 ? bound / size : follows;
     if (d == 3 || size == 0) turn += turns * (tangential - direction * direction.transpose());
-    out.value += tangential * force - bound * direction;
+    out.value += across_normal(tangential * force - bound * direction);
     out.by_force += tangential - turn - direction * widening.transpose();
     out.by_velocity -= beta * turn;
   }

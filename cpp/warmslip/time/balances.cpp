@@ -18,6 +18,8 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
       elastic_rows_(row_sizes(operators.elasticity)),
       viscous_rows_(row_sizes(operators.viscosity)),
       expansion_rows_(row_sizes(operators.expansion)),
+      spring_rows_(row_sizes(operators.springs)),
+      dashpot_rows_(row_sizes(operators.dashpots)),
       mass_rows_(row_sizes(operators.mass)),
       conduction_rows_(row_sizes(operators.conductivity)),
       exchange_rows_(row_sizes(operators.exchange)),

@@ -77,9 +77,9 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
         l.support_work += in.k * reaction.dot(way);
         (*reactions).template segment<d>(i * d) = reaction;
       } else {
-        // inner forces cancel in the sum over a body
-        force.add(position, external + springy,
-                  moved + given + size(springy) + rigid_share_ * (magnitude - moved - given));
+        // inner forces cancel in the sum over a body; those of springs along a normal are sums of larger terms
+        const double sprung = u * row(spring_rows_) + w * row(dashpot_rows_);
+        force.add(position, external + springy, moved + given + sprung + rigid_share_ * (magnitude - moved - given));
       }
       if (!fixed) {
         const Point<d> over = held ? Point<d>(left - *held * left) : left;
