@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,8 +45,7 @@ def _refuse_unused(scene: Scene, loads: Loads) -> None:
             )
 
 
-@dataclass(frozen=True)
-class StepData:
+class StepData(NamedTuple):
     """What one step is given: load vectors (f, v) and (q, eta), the gap (points), velocity and temperature of the supports
     where those are not zero, theta_F (points) where the conductance depends on the pressure, the velocity of the foundation
     (d points) where it moves along; None or empty what is absent."""
@@ -59,9 +57,6 @@ class StepData:
     support_temperature: Any
     foundation: Array
     foundation_velocity: Array
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(getattr(self, one.name) for one in fields(self))
 
 
 class LoadVectors:

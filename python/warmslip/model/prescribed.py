@@ -59,8 +59,10 @@ class PrescribedContact:
     @property
     def of_time(self) -> bool:
         """Whether supports or gaps of such points change in time."""
+        if not self._points:
+            return False
         gaps = [self.loads.on_contact("gap", i) for i, c in enumerate(self.scene.contacts) if c.stiffness is not None]
-        return bool(self._points) and (self.vectors.supports.of_time or any(map(of_time, gaps)))
+        return self.vectors.supports.of_time or any(map(of_time, gaps))
 
     def inside(self, t: float) -> str:
         """Which of them is deepest inside at time t, with its cure; "" where none is (collective)."""

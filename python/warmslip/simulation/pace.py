@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ NO_STEP = "the state is at t = {:.6g}, where no step of the scene ends; give a t
 SAFETY = 2.0  # an estimate is this far below the tolerance before steps grow
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """The step that is to be taken: its number from 1, its end and its size, times, and whether it is the last one."""
 
     number: int
@@ -49,11 +48,16 @@ class FixedPace:
         """Number of steps of the whole run."""
         return self._clock.steps
 
+    @property
+    def finished(self) -> bool:
+        """Whether the last step was taken."""
+        return self.taken >= self._clock.steps
+
     def next(self) -> Step | None:
         """The step to take, None at the end."""
-        n = self.taken + 1
-        if n > self._clock.steps:
+        if self.finished:
             return None
+        n = self.taken + 1
         time, size = self._clock.step(n)
         return Step(n, time, size, n == self._clock.steps)
 
@@ -108,11 +112,16 @@ class AdaptivePace:
         left = self._steps * 2**FLOOR - self.ticks
         return int(self.taken + math.ceil(left * 2.0 ** (self.level - FLOOR)))
 
+    @property
+    def finished(self) -> bool:
+        """Whether the last step was taken."""
+        return self.ticks >= self._steps << FLOOR
+
     def next(self) -> Step | None:
         """The step to take, None at the end."""
-        whole = self._steps * 2**FLOOR
-        if self.ticks >= whole:
+        if self.finished:
             return None
+        whole = self._steps * 2**FLOOR
         end = self.ticks + 2 ** (FLOOR - self.level)
         time = self._end if end == whole else self._end * (end / whole)
         return Step(self.taken + 1, time, self.size(self.level), end == whole)

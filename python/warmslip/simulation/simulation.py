@@ -117,7 +117,7 @@ class Simulation(Shown):
     @property
     def finished(self) -> bool:
         """Whether the last step was taken."""
-        return self.pace.next() is None
+        return self.pace.finished
 
     @cached_property
     def _price(self) -> float:

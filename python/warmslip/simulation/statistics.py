@@ -14,12 +14,14 @@ FIELDS = ("u", "theta", "stress", "contact_force")  # whose errors are estimated
 
 def residuals(report: Any) -> dict[str, float]:
     """The relative residual of each balance of a step, dimensionless."""
-    return {name: float(getattr(report.balances, f"{name}_residual")) for name in BALANCES}
+    balances = report.balances
+    return {name: getattr(balances, f"{name}_residual") for name in BALANCES}
 
 
 def estimates(report: Any) -> dict[str, float]:
     """Estimated relative errors of the fields that were measured in the step, dimensionless."""
-    found = {name: float(getattr(report.errors, name)) for name in FIELDS}
+    errors = report.errors
+    found = {name: getattr(errors, name) for name in FIELDS}
     return {name: value for name, value in found.items() if value == value}
 
 
