@@ -52,6 +52,7 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   for (const Index node : nodes_of(mesh, touching)) {
     number[node] = static_cast<Eigen::Index>(nodes_.size());
     nodes_.push_back(node);
+    global_nodes_.push_back(layout_.global_of(node));
   }
   const auto held_at = [&](Index node) -> Tensor2<d> {
     const auto found = supports.find(node);
@@ -160,38 +161,35 @@ template <int d>
 void ContactSurface<d>::add(const Eigen::VectorXd& nodal, Vec v) const {
   PetscInt begin, end;
   WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
-  const auto indices = unknowns(d);
   Values owned(v);
-  for (std::size_t i = 0; i < indices.size(); ++i)
-    if (indices[i] >= begin && indices[i] < end) (*owned)[indices[i] - begin] += nodal[static_cast<Eigen::Index>(i)];
+  for (Eigen::Index i = 0; i < nodes(); ++i) {
+    const Eigen::Index first = Eigen::Index{global_nodes_[static_cast<std::size_t>(i)]} * d - begin;
+    if (first >= 0 && first < end - begin) (*owned).template segment<d>(first) += nodal.template segment<d>(i * d);
+  }
 }
 
 template <int d>
 std::vector<PetscInt> ContactSurface<d>::unknowns(int block) const {
   std::vector<PetscInt> indices;
-  for (const Index node : nodes_)
-    for (int a = 0; a < d; ++a) indices.push_back(layout_.global_of(node) * block + a);
-  return indices;
-}
-
-template <int d>
-std::vector<PetscInt> ContactSurface<d>::global_nodes() const {
-  std::vector<PetscInt> indices;
-  for (const Index node : nodes_) indices.push_back(layout_.global_of(node));
+  indices.reserve(nodes_.size() * d);
+  for (const PetscInt node : global_nodes_)
+    for (int a = 0; a < d; ++a) indices.push_back(node * block + a);
   return indices;
 }
 
 template <int d>
 Eigen::VectorXd ContactSurface<d>::nodal_values(Vec v) const {
   if (nodes_.empty()) return {};
+  const Eigen::Index block = block_size(v), count = block == 1 ? 1 : d;
   PetscInt begin, end;
   WARMSLIP_PETSC(VecGetOwnershipRange(v, &begin, &end));
-  const auto indices = block_size(v) == 1 ? global_nodes() : unknowns(d);
-  Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(indices.size()));
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(nodes() * count);
   {
     Values owned(v);
-    for (std::size_t i = 0; i < indices.size(); ++i)
-      if (indices[i] >= begin && indices[i] < end) values[static_cast<Eigen::Index>(i)] = (*owned)[indices[i] - begin];
+    for (Eigen::Index i = 0; i < nodes(); ++i) {
+      const Eigen::Index first = global_nodes_[static_cast<std::size_t>(i)] * block - begin;
+      if (first >= 0 && first < end - begin) values.segment(i * count, count) = (*owned).segment(first, count);
+    }
   }
   return layout_.sum(std::move(values));
 }

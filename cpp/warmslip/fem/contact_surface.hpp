@@ -39,7 +39,7 @@ class ContactSurface {
   /// nodes).
   std::vector<PetscInt> unknowns(int block) const;
   /// Global numbers of the contact nodes, (nodes).
-  std::vector<PetscInt> global_nodes() const;
+  const std::vector<PetscInt>& global_nodes() const { return global_nodes_; }
   /// Values of the contact nodes on every rank: (d nodes) of a displacement-like vector, (nodes) of a temperature.
   Eigen::VectorXd nodal_values(Vec v) const;
   const std::vector<Index>& mesh_nodes() const { return nodes_; }  ///< the contact nodes in the mesh's numbering
@@ -66,6 +66,7 @@ class ContactSurface {
  private:
   const Layout<d>& layout_;
   std::vector<Index> nodes_;
+  std::vector<PetscInt> global_nodes_;
   std::vector<std::size_t> contacts_;
   std::vector<bool> prescribed_;
   std::vector<Eigen::Index> own_nodes_;

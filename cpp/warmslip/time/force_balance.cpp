@@ -52,7 +52,7 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       };
       const Point<d> p1 = at(*m1), p0 = at(*m0), inertia = (p1 - p0) / in.k, load = at(*f), contact_here = at(*c),
                      elastic = at(*e1), viscous = at(*b), expansion = at(*g), way = at(*velocity);
-      const Point<d> springy = at(*springs) + at(*dashpots);
+      const Point<d> springy = springs_ || dashpots_ ? Point<d>(at(*springs) + at(*dashpots)) : Point<d>::Zero();
       const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
       const auto row = [i](const Eigen::VectorXd& rows) { return rows.size() ? rows[i] : 0; };
       const auto size = [](const Point<d>& p) { return p.cwiseAbs().maxCoeff(); };
@@ -78,7 +78,7 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
         (*reactions).template segment<d>(i * d) = reaction;
       } else {
         // inner forces cancel in the sum over a body; those of springs along a normal are sums of larger terms
-        const double sprung = u * row(spring_rows_) + w * row(dashpot_rows_);
+        const double sprung = springs_ || dashpots_ ? u * row(spring_rows_) + w * row(dashpot_rows_) : 0;
         force.add(position, external + springy, moved + given + sprung + rigid_share_ * (magnitude - moved - given));
       }
       if (!fixed) {

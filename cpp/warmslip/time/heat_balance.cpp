@@ -42,13 +42,14 @@ void BalanceEvaluator<d>::heat(const TimeLevel& before, const TimeLevel& after, 
       const double terms = given + 2 * both * mass_rows_[i] / in.k + theta * conduction_rows_[i] +
                            theta * at(exchange_rows_, i) + at(*sizes, i) + w * at(heating_rows_, i),
                    magnitude = terms + carried * at(heating_rows_, i);
-      content += temperature_prescribed_[static_cast<std::size_t>(i)] ? external - wall : external;
+      const bool prescribed = temperature_prescribed_[static_cast<std::size_t>(i)];
+      content += prescribed ? external - wall : external;
       content_size += magnitude;
-      if (stores_magnitudes_) heat_magnitudes_[i] = temperature_prescribed_[static_cast<std::size_t>(i)] ? 0 : terms;
-      if (stores_magnitudes_)
-        heat_external_[i] =
-            temperature_prescribed_[static_cast<std::size_t>(i)] ? 0 : terms - theta * conduction_rows_[i];
-      if (temperature_prescribed_[static_cast<std::size_t>(i)]) {
+      if (stores_magnitudes_) {
+        heat_magnitudes_[i] = prescribed ? 0 : terms;
+        heat_external_[i] = prescribed ? 0 : terms - theta * conduction_rows_[i];
+      }
+      if (prescribed) {
         l.support_heat += in.k * wall * (*values)[i];
         (*given_there)[i] = wall;
       } else {
