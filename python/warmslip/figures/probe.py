@@ -36,9 +36,15 @@ def probe(inputs: list[Path]) -> tuple[Figure, str]:
                 ax.legend(fontsize=7)
         for ax in line[len(fields) :]:
             ax.set_axis_off()
-        ranges = [f"{n} {number(table[n].min())} to {number(table[n].max())}" for c in fields.values() for n in c]
-        captions.append(f"{path.stem}, {len(np.unique(table['step']))} steps: {', '.join(ranges)}.")
+        ranges = [f"{n} {_range(table[n])}" for c in fields.values() for n in c]
+        captions.append(f"{path.stem}, {len(np.unique(table['step']))} times: {', '.join(ranges)}.")
     return figure, " ".join(captions)
+
+
+def _range(values: Array) -> str:
+    """The smallest and the largest value; the state that a run begins with has no contact forces, nan."""
+    known = values[np.isfinite(values)]
+    return f"{number(known.min())} to {number(known.max())}" if len(known) else "unknown"
 
 
 def _read(path: Path) -> dict[str, Array]:
