@@ -276,7 +276,8 @@ def test_drawings(tmp_path: Path) -> None:
     assert f"temperature {min(values):.3g} to {max(values):.3g}" in caption
     assert "line, 7 times: displacement_x" in caption
     draw("probe", [tmp_path / "probes/edge.csv"], tmp_path / "edge.png")
-    assert "nan" not in (tmp_path / "edge.rst").read_text()
+    pressure = [row["pressure"] for row in table(tmp_path, "edge") if row["step"]]
+    assert f"pressure {min(pressure):.3g} to {max(pressure):.3g}" in (tmp_path / "edge.rst").read_text()
     with pytest.raises(ValueError, match="'probe' is drawn from"):
         draw("probe", [tmp_path / "probe.rst"], tmp_path / "none.png")
 
