@@ -132,6 +132,10 @@ def gauss_points_count_where_their_nodes_are_held_across(d: int) -> None:
             assert len(list(simulation.steps())) == 1 and simulation.outcome == "support_inside_foundation"
             assert "0.005 inside its rigid foundation" in simulation.failure["reason"]  # type: ignore[index]
             completed(body("-0.02 * t", corners[:1], **friction))
+            across = body("-0.02 * t", corners[:1], **friction)
+            beside_it = [{"at": [*place, 0.0], "displacement": [0.0, *["free"] * (d - 1)]} for place in corners[1:]]
+            points = [point.model_dump(exclude_none=True) for point in across.supports.points]
+            completed(across.override(**{"supports.points": [*points, *beside_it]}))  # held along the surface alone
             completed(body("-0.02 * t", corners, gap=0.0201, **friction))
 
 
