@@ -50,7 +50,9 @@ def test_paper_plans_every_case(snakemake: Snakemake) -> None:
     assert jobs["study"] == len(READINGS) * 2 * 3 + 1
     assert jobs["run"] == len(READINGS) * 2
     assert all(jobs[f"figure_{n}"] == len(READINGS) for n in (2, 3, 4, 5))
-    assert all(jobs[name] == 1 for name in ("figure_1", "verdict", "page", "judged", "rates", "readings", "work", "extremes"))
+    assert all(
+        jobs[name] == 1 for name in ("figure_1", "verdict", "page", "judged", "rates", "readings", "work", "extremes")
+    )
 
 
 def test_fresh_clone_makes_all_of_it_anew(snakemake: Snakemake, tmp_path: Path) -> None:
@@ -101,7 +103,14 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     first = snakemake(*small)
     assert first.returncode == 0, first.stdout + first.stderr
     paper = tmp_path / "results/runs/ci/paper"
-    for name in ("verdict.json", "rates.csv", "readings.csv", "manufactured.csv", "figures/figure_1.png", "report.html"):
+    for name in (
+        "verdict.json",
+        "rates.csv",
+        "readings.csv",
+        "manufactured.csv",
+        "figures/figure_1.png",
+        "report.html",
+    ):
         assert (paper / name).stat().st_size > 0
     pictures = sorted((tmp_path / "results/runs/ci").rglob("*.png"))
     assert len(pictures) == 1 + 6 * len(READINGS) + 3

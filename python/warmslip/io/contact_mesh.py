@@ -115,4 +115,6 @@ def _contact_points(d: Discretisation, contact: int, facets: Any) -> Any:
 
 def _largest(means: Any, values: Array) -> Array:
     """The largest value of the points of each facet."""
-    return np.asarray([values[means.indices[a:b]].max() for a, b in zip(means.indptr[:-1], means.indptr[1:], strict=True)])
+    return np.asarray(
+        [values[means.indices[a:b]].max() for a, b in zip(means.indptr[:-1], means.indptr[1:], strict=True)]
+    )

@@ -15,7 +15,6 @@ from warmslip.io.vtu import three
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
-
 Fields = dict[str, Array]
 
 

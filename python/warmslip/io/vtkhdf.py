@@ -10,7 +10,12 @@ import numpy as np
 
 from warmslip.typing import Array
 
-TYPES = {"vertex": (1, 1), "line": (3, 2), "triangle": (5, 3), "tetra": (10, 4)}  # of VTK by their names in meshio, and nodes
+TYPES = {
+    "vertex": (1, 1),
+    "line": (3, 2),
+    "triangle": (5, 3),
+    "tetra": (10, 4),
+}  # of VTK by their names in meshio, and nodes
 WHOLE = "i8"
 
 

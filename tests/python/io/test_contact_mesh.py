@@ -57,7 +57,10 @@ def integral(mesh: Any, name: str) -> Any:
 
 SCENES = {
     "two parts at a corner": ("quasistatic_punch", WEDGE),
-    "curved": ("plate_with_hole", {"time.steps": 2, "contact": [{"part": "hole", "stiffness": 10.0, "gap": "-0.01 * t"}]}),
+    "curved": (
+        "plate_with_hole",
+        {"time.steps": 2, "contact": [{"part": "hole", "stiffness": 10.0, "gap": "-0.01 * t"}]},
+    ),
     "space": ("block_3d", {"time.steps": 2, "mesh.n": 2}),
     "round in space": ("quarter_sphere", {"time.steps": 2, "mesh.n": 2}),
 }

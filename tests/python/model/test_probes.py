@@ -315,9 +315,15 @@ def test_two_ranks_write_the_tables_of_one(command: Command, tmp_path: Path) -> 
 
 def test_the_first_row_is_the_state_that_the_run_begins_with(tmp_path: Path) -> None:
     """Of a scene, and of another run: as the first state of the trajectory."""
-    warm = {"initial": {"temperature": "x + 2 * y + 1", "displacement": ["0.01 * x", "0"], "velocity": ["0.1", "0.2 * y"]}}
-    sides = {side: [f"0.01 * x + {speed} * t", "0.2 * y * t"] for side, speed in (("left", 0.1), ("right", 0.1), ("top", 0.1))}
-    one = build(SQUARE | warm | {"inertia": {"density": 1.0}, "output": {"probes": {"point": POINT, "rare": POINT | {"every": 4}}}})
+    warm = {
+        "initial": {"temperature": "x + 2 * y + 1", "displacement": ["0.01 * x", "0"], "velocity": ["0.1", "0.2 * y"]}
+    }
+    sides = {
+        side: [f"0.01 * x + {speed} * t", "0.2 * y * t"]
+        for side, speed in (("left", 0.1), ("right", 0.1), ("top", 0.1))
+    }
+    named = {"point": POINT, "rare": POINT | {"every": 4}}
+    one = build(SQUARE | warm | {"inertia": {"density": 1.0}, "output": {"probes": named}})
     one = one.override(**{"supports.displacement": sides})
     warmslip.run(one, out=tmp_path / "first")
     more = one.override(**{"initial": {"from": str(tmp_path / "first/trajectory.h5")}, "supports.displacement": None})

@@ -101,7 +101,7 @@ def test_what_belongs_to_no_page_is_refused(command: Command, tmp_path: Path) ->
     (tmp_path / "other.png").write_bytes(FIGURES[0].read_bytes())
     (tmp_path / "other.rst").write_text("a caption")
     good = {"readings": RESULTS / "readings.csv", "verdict": RESULTS / "verdict.json", "out": tmp_path / "report.html"}
-    with pytest.raises(ValueError, match="other.png belongs to no section of the page"):
+    with pytest.raises(ValueError, match=r"other\.png belongs to no section of the page"):
         page([tmp_path / "other.png"], **good)
     (tmp_path / "verdict.json").write_text("{}")
     with pytest.raises(ValueError, match="is no verdict of `warmslip judge`"):
