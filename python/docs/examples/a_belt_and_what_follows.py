@@ -42,9 +42,9 @@ assert np.isclose(velocity[-1], SPEED, rtol=0.02)
 # %% [markdown]
 # ## The same scene to a later end
 #
-# With twice the end and twice the steps, the step size stays, and the run goes on from its last state. On the command line this
-# is `warmslip run belt.toml --set time.end=2 --set time.steps=200 --out belt --resume`. The files of the folder grow: trajectory,
-# probes and summary are those of one long run, to the last bit on one process.
+# With twice the end and twice the steps, the step size stays, and the run goes on from its last state. On the command line, this
+# is the same `warmslip run` with `--set time.end=2 --set time.steps=200 --resume`. Trajectory and probes grow in their folder. On
+# one process, they are bitwise those of one long run.
 
 # %%
 longer = scene.override(**{"time.end": 2.0, "time.steps": 200})
@@ -84,9 +84,10 @@ ax.set(xlabel="t", ylabel="velocity of the centre")
 _ = ax.legend()
 
 # %% [markdown]
-# ## Heat and work
+# ## When it slipped
 #
-# Half of the heat of friction went into the block, in both runs. The contact points of the probe `sole` show when it slipped.
+# The contact points of the probe `sole` show when the block slipped. Half of the heat of friction goes into the block, and
+# braking has warmed it further.
 
 # %%
 sole = tables.read(Path("stopped/probes/sole.csv"))
