@@ -77,7 +77,7 @@ def _histories(ax: Any, table: dict[str, Array], columns: list[str]) -> None:
 
 def _profiles(ax: Any, table: dict[str, Array], columns: list[str]) -> None:
     """Along the line, dark at the first of several times and light at the last; a line style for each component."""
-    times = np.unique(table["time"])
+    times = np.unique(table["time"][np.isfinite(table[columns[0]])])  # the start has no contact forces
     chosen = times[np.unique(np.linspace(0, len(times) - 1, min(TIMES, len(times))).round().astype(int))]
     for name, style in zip(columns, ("-", "--", ":", "-."), strict=False):
         for i, t in enumerate(chosen):

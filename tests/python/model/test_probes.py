@@ -13,6 +13,7 @@ from support.stopped import KilledError, stop_after
 import warmslip
 from warmslip import SceneError, _core
 from warmslip.figures import draw
+from warmslip.figures.probe import probe as probe_figure
 from warmslip.model.meshes import make_mesh
 from warmslip.model.probes import probes
 from warmslip.records import tables
@@ -276,6 +277,9 @@ def test_drawings(tmp_path: Path) -> None:
     assert f"temperature {min(values):.3g} to {max(values):.3g}" in caption
     assert "line, 7 times: displacement_x" in caption
     draw("probe", [tmp_path / "probes/edge.csv"], tmp_path / "edge.png")
+    figure, _ = probe_figure([tmp_path / "probes/edge.csv"])
+    labels = {ax.get_title(): ax.get_xlabel() for ax in figure.axes}
+    assert "t = 0, " in labels["edge: gap"] and "t = 0.167, " in labels["edge: pressure"]
     pressure = [row["pressure"] for row in table(tmp_path, "edge") if row["step"]]
     assert f"pressure {min(pressure):.3g} to {max(pressure):.3g}" in (tmp_path / "edge.rst").read_text()
     with pytest.raises(ValueError, match="'probe' is drawn from"):
