@@ -9,6 +9,7 @@ rule all:
         rules.figures.input,
         rules.tables.input,
         rules.verdict.output,
+        rules.page.output,
         rules.judged.output,
     message:
         "everything is there"

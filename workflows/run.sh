@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Reproduces the paper: sets the checkout up, says what will run and for how long, runs the workflow, builds the report.
+# Reproduces the paper: sets the checkout up, says what will run and for how long, runs the workflow.
 # Arguments go to snakemake, as in `bash workflows/run.sh --configfile workflows/config/ci.yaml`.
 # What is already there and up to date is not made again. Ends non-zero when a job or the verdict failed.
 set -euo pipefail
@@ -15,7 +15,6 @@ for ((i = 1; i < $#; i++)); do
 done
 folder() { sed -n "s/^  $1: *//p" "$config"; }
 paper=$(folder paper)
-report=$paper/report.html
 
 noise='^Select jobs\|^Execute \|^\[\|^Using \|^Assuming \|^Building \|^Rules claiming \|^$'
 quietly() { snakemake "$@" 2>&1 | sed -u "/$noise/d"; }
@@ -29,16 +28,6 @@ if grep -q '^total ' <<<"$plan"; then
 else
   echo "== everything of $config is up to date"
 fi
-for argument in "$@"; do  # a dry run leaves everything as it is, the report too
-  case $argument in -n | --dry-run | --dryrun) exit "$status" ;; esac
-done
-
-# the report again only when something in it is newer; a missing figure leaves the old one
-if [[ ! -e $report || -n $(find "$paper" "$(folder tradeoff)" "$(folder extremes)" -newer "$report" -type f -print -quit) ]]; then
-  echo "== building the report"
-  quietly --quiet all --report "$report" "$@" || { status=1 && echo "== no report: see the failed jobs above" >&2; }
-fi
-
-echo "== look at $report, the figures in $paper/figures, the verdict in $paper/verdict.json"
+echo "== look at $paper/report.html, the figures in $paper/figures, the verdict in $paper/verdict.json"
 ((status == 0)) || echo "== not everything is right: a job failed, or the verdict did" >&2
 exit "$status"

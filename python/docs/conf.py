@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import os
 import re
@@ -24,7 +25,11 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext
 exclude_patterns = ["conf.py", "generated.py", "gallery.py", "README.md"]
 html_theme = "furo"
 html_title = "warmslip"
-html_static_path = ["_static"]
+# one file of MathJax, from the package that holds it; sphinx would refer to a server
+_mathjax = importlib.util.find_spec("sphinx-mathjax-offline")
+assert _mathjax is not None and _mathjax.origin is not None, "pip install sphinx-mathjax-offline"
+html_static_path = ["_static", str(Path(_mathjax.origin).parent / "static/mathjax/tex-svg.js")]
+mathjax_path = "tex-svg.js"
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False

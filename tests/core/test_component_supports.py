@@ -274,6 +274,20 @@ def what_supports_leave_free_is_seen(d: int) -> None:
         assert simulation.discretisation.field(simulation.stepper.strained) is not None
 
 
+@check
+def supports_that_part_in_a_run_end_it_by_their_name(d: int) -> None:
+    """They agree at t = 0, 1/2 and 1, where they are compared beforehand, and not at t = 3/4; states before are kept."""
+    apart = {"left": along(d, "free", "t * (1 - t) * (t - 0.5) * (t > 0.6)"), "top": along(d, "-0.01 * t")}
+    simulation = Simulation(pressed(d, apart, n=2))
+    taken = len(list(simulation.steps()))
+    assert (simulation.outcome, taken, simulation.failure["step"]) == ("supports_contradict", 2, 3)  # type: ignore[index]
+    assert "contradict each other at t = 0.75" in simulation.failure["reason"]  # type: ignore[index]
+    top = np.asarray(simulation.discretisation.mesh.nodes)[:, -1] == 1
+    assert field(simulation, "u")[top, -1] == pytest.approx(-0.005, rel=1e-12)
+    undefined = Simulation(pressed(d, {"top": along(d, "1 / (0.75 - t) * 0")}, n=2))
+    assert len(list(undefined.steps())) == 2 and undefined.outcome == "data_not_finite"
+
+
 def test_supports_that_meet() -> None:
     """They are joined where they agree, in any order, and refused with the place where they do not."""
     agree = {"left": ["0.1 * t", "free"], "top": ["0.1 * t", "-0.02 * t"], "bottom": [0.0, "free"]}

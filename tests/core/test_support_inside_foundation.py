@@ -109,6 +109,37 @@ def gauss_points_count_where_all_their_nodes_are_held(d: int) -> None:
 
 
 @check
+def gauss_points_count_where_their_nodes_are_held_across(d: int) -> None:
+    """Single nodes that are held along the normal alone: a facet of theirs cannot give way, beside free nodes it does."""
+    corners = [[0.0], [0.5]] if d == 2 else [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]]
+    for rule in ("gauss-1", "gauss-2"):
+        for mu in (0.0, 0.3):
+            friction = {"friction": {"coefficient": mu}} if mu else {}
+
+            def body(inside: Any, places: list[list[float]], gap: float = 0.005, rule: str = rule, **more: Any) -> Any:
+                held_points = [{"at": [*place, 0.0], "displacement": [*["free"] * (d - 1), inside]} for place in places]
+                return scene(
+                    d,
+                    2,
+                    elasticity=elasticity(d, 1.0, 0.3),
+                    supports={"displacement": {"top": [0.0] * d}, "points": held_points},
+                    contact={"part": "bottom", "stiffness": "rigid", "gap": gap, "quadrature": rule} | more,
+                )
+
+            with pytest.raises(ValueError, match=r"holds 'bottom' 0\.015 inside its rigid foundation at .* at t = 0,"):
+                Simulation(body(-0.02, corners, **friction))
+            simulation = Simulation(body("-0.02 * t", corners, **friction))
+            assert len(list(simulation.steps())) == 1 and simulation.outcome == "support_inside_foundation"
+            assert "0.005 inside its rigid foundation" in simulation.failure["reason"]  # type: ignore[index]
+            completed(body("-0.02 * t", corners[:1], **friction))
+            across = body("-0.02 * t", corners[:1], **friction)
+            beside_it = [{"at": [*place, 0.0], "displacement": [0.0, *["free"] * (d - 1)]} for place in corners[1:]]
+            points = [point.model_dump(exclude_none=True) for point in across.supports.points]
+            completed(across.override(**{"supports.points": [*points, *beside_it]}))  # held along the surface alone
+            completed(body("-0.02 * t", corners, gap=0.0201, **friction))
+
+
+@check
 def a_wall_beside_its_support(d: int) -> None:
     """A held node lies on its rigid foundation to the rounding of its normal and of the solve, and is not inside."""
     for mu in (0.0, 0.3):

@@ -17,6 +17,7 @@ EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
 def test_there_are_examples() -> None:
     names = {path.stem for path in EXAMPLES}
     assert {"the_papers_problem", "a_scene_of_your_own", "writing_a_contact_law", "comparing_readings"} <= names
+    assert {"a_quarter_of_a_block", "a_belt_and_what_follows"} <= names
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

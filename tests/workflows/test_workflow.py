@@ -50,7 +50,9 @@ def test_paper_plans_every_case(snakemake: Snakemake) -> None:
     assert jobs["study"] == len(READINGS) * 2 * 3 + 1
     assert jobs["run"] == len(READINGS) * 2
     assert all(jobs[f"figure_{n}"] == len(READINGS) for n in (2, 3, 4, 5))
-    assert all(jobs[name] == 1 for name in ("figure_1", "verdict", "judged", "rates", "readings", "work", "extremes"))
+    assert all(
+        jobs[name] == 1 for name in ("figure_1", "verdict", "page", "judged", "rates", "readings", "work", "extremes")
+    )
 
 
 def test_fresh_clone_makes_all_of_it_anew(snakemake: Snakemake, tmp_path: Path) -> None:
@@ -101,17 +103,24 @@ def test_small_grid_end_to_end(snakemake: Snakemake, tmp_path: Path) -> None:
     first = snakemake(*small)
     assert first.returncode == 0, first.stdout + first.stderr
     paper = tmp_path / "results/runs/ci/paper"
-    for name in ("verdict.json", "rates.csv", "readings.csv", "manufactured.csv", "figures/figure_1.png"):
+    for name in (
+        "verdict.json",
+        "rates.csv",
+        "readings.csv",
+        "manufactured.csv",
+        "figures/figure_1.png",
+        "report.html",
+    ):
         assert (paper / name).stat().st_size > 0
     pictures = sorted((tmp_path / "results/runs/ci").rglob("*.png"))
-    assert len(pictures) == 1 + 6 * len(READINGS) + 4
+    assert len(pictures) == 1 + 6 * len(READINGS) + 3
     assert all(picture.stat().st_size < 2**20 for picture in pictures)
     assert all(picture.with_suffix(".rst").read_text().strip() for picture in pictures)
 
     assert plan(snakemake("--dry-run", "--quiet", "rules", *small)) == {}
 
     (paper / "figures/figure_5_printed.png").unlink()
-    assert plan(snakemake("--dry-run", "--quiet", "rules", *small)) == {"figure_5": 1, "all": 1}
+    assert plan(snakemake("--dry-run", "--quiet", "rules", *small)) == {"figure_5": 1, "page": 1, "all": 1}
     assert snakemake(*small).returncode == 0
 
     (tmp_path / "other").mkdir()

@@ -158,26 +158,6 @@ rule grid:
         "warmslip draw grid {input} --out {output.figure}"
 
 
-rule readings_figure:
-    """The claims of the paper, reading by reading."""
-    input:
-        "<paper>/readings.csv",
-    output:
-        figure=report(
-            "<paper>/figures/readings.png",
-            caption=CAPTION,
-            category="6 Readings of the paper",
-            labels={"figure": "claims"},
-        ),
-        caption="<paper>/figures/readings.rst",
-    params:
-        code=FIGURES,
-    message:
-        "figure {output.figure}"
-    shell:
-        "warmslip draw table {input} --out {output.figure}"
-
-
 rule work_figure:
     """Error against cost."""
     input:
@@ -186,7 +166,7 @@ rule work_figure:
         figure=report(
             "<tradeoff>/work.png",
             caption=CAPTION,
-            category="7 Speed against accuracy",
+            category="6 Speed against accuracy",
             labels={"figure": "work and precision"},
         ),
         caption="<tradeoff>/work.rst",
@@ -206,7 +186,7 @@ rule extremes_figure:
         figure=report(
             "<extremes>/extremes.png",
             caption=CAPTION,
-            category="8 Extremes",
+            category="7 Extremes",
             labels={"figure": "outcomes"},
         ),
         caption="<extremes>/extremes.rst",
@@ -226,7 +206,7 @@ rule blocks_figure:
         figure=report(
             "<tradeoff>/blocks.png",
             caption=CAPTION,
-            category="7 Speed against accuracy",
+            category="6 Speed against accuracy",
             labels={"figure": "cost of blocks"},
         ),
         caption="<tradeoff>/blocks.rst",
@@ -251,7 +231,6 @@ rule figures:
             kind=["orders", "grid"],
             reading=READINGS,
         ),
-        "<paper>/figures/readings.png",
         "<tradeoff>/work.png",
         "<tradeoff>/blocks.png",
         "<extremes>/extremes.png",

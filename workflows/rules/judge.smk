@@ -25,6 +25,23 @@ rule verdict:
         " --extremes {input.extremes} {params.studies} --expected {input.expected} --out {output} --no-fail"
 
 
+rule page:
+    """The figures, the readings and the verdict on one page."""
+    input:
+        figures=rules.figures.input,
+        readings="<paper>/readings.csv",
+        verdict="<paper>/verdict.json",
+        template=PACKAGE / "paper/templates/paper.html",
+    output:
+        "<paper>/report.html",
+    params:
+        code=digest("paper"),
+    message:
+        "the page: {output}"
+    shell:
+        "warmslip page {input.figures} --readings {input.readings} --verdict {input.verdict} --out {output}"
+
+
 rule judged:
     """Fails when the verdict did."""
     input:

@@ -69,7 +69,12 @@ PANELS: dict[str, tuple[tuple[str, Any], ...]] = {
         ("trade", study.trade),
         ("schema", scene.schema),
     ),
-    "Reproduce the paper": (("readings", study.readings), ("work", study.work), ("judge", study.judge)),
+    "Reproduce the paper": (
+        ("readings", study.readings),
+        ("work", study.work),
+        ("judge", study.judge),
+        ("page", study.page),
+    ),
 }
 for panel, commands in PANELS.items():
     for name, function in commands:

@@ -218,6 +218,18 @@ def judge(
         raise typer.Exit(1)
 
 
+def page(
+    figures: Annotated[list[Path], typer.Argument(help="figures with their captions beside them, in their order")],
+    readings: Annotated[Path, typer.Option(help="the table of `warmslip readings`")],
+    verdict: Annotated[Path, typer.Option(help="the verdict of `warmslip judge`")],
+    out: Annotated[Path, typer.Option(help="the page to write, HTML")],
+) -> None:
+    """Write the page of the paper: its figures, the readings and the verdict in one file."""
+    from warmslip.paper import page as paper
+
+    paper.page(figures, readings, verdict, out)
+
+
 def draw(
     kind: Annotated[str, typer.Argument(help="; ".join(f"{kind}: from {what}" for kind, (_, what) in KINDS.items()))],
     inputs: Annotated[list[Path], typer.Argument(help="tables or trajectories it is drawn from")],

@@ -44,7 +44,7 @@ def _matrix(ax: Axes, lines: list[dict[str, str]]) -> str:
     for line in lines:
         at = down.index((line["motion"], line["contact"])), across.index((line["heat"], line["exchange"]))
         values[at] = float(line["over_whole_model"])
-    ax.imshow(values, cmap=cm.batlow_r, vmin=0, vmax=1.1, aspect="auto")
+    ax.imshow(values, cmap=cm.oslo_r, vmin=0, vmax=1.4, aspect="auto")
     for (i, j), value in np.ndenumerate(values):
         if value == value:
             ax.text(

@@ -36,9 +36,15 @@ def probe(inputs: list[Path]) -> tuple[Figure, str]:
                 ax.legend(fontsize=7)
         for ax in line[len(fields) :]:
             ax.set_axis_off()
-        ranges = [f"{n} {number(table[n].min())} to {number(table[n].max())}" for c in fields.values() for n in c]
-        captions.append(f"{path.stem}, {len(np.unique(table['step']))} steps: {', '.join(ranges)}.")
+        ranges = [f"{n} {_range(table[n])}" for c in fields.values() for n in c]
+        captions.append(f"{path.stem}, {len(np.unique(table['step']))} times: {', '.join(ranges)}.")
     return figure, " ".join(captions)
+
+
+def _range(values: Array) -> str:
+    """The smallest and the largest value; the state that a run begins with has no contact forces, nan."""
+    known = values[np.isfinite(values)]
+    return f"{number(known.min())} to {number(known.max())}" if len(known) else "unknown"
 
 
 def _read(path: Path) -> dict[str, Array]:
@@ -71,7 +77,7 @@ def _histories(ax: Any, table: dict[str, Array], columns: list[str]) -> None:
 
 def _profiles(ax: Any, table: dict[str, Array], columns: list[str]) -> None:
     """Along the line, dark at the first of several times and light at the last; a line style for each component."""
-    times = np.unique(table["time"])
+    times = np.unique(table["time"][np.isfinite(table[columns[0]])])  # the start has no contact forces
     chosen = times[np.unique(np.linspace(0, len(times) - 1, min(TIMES, len(times))).round().astype(int))]
     for name, style in zip(columns, ("-", "--", ":", "-."), strict=False):
         for i, t in enumerate(chosen):

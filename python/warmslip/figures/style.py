@@ -91,7 +91,7 @@ def number(value: float, digits: int = 3) -> str:
     """A number as people write it: 0.0123, 1.23e-5, 1e12."""
     if not np.isfinite(value):
         return "-"
-    mantissa, e, exponent = f"{value:.{digits}g}".partition("e")
+    mantissa, e, exponent = f"{value + 0.0:.{digits}g}".partition("e")  # no -0
     return mantissa + (f"e{int(exponent)}" if e else "")
 
 

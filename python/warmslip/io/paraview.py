@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warmslip.io.contact_mesh import GEOMETRY, geometry
 from warmslip.io.paraview_files import HdfSeries, VtuSeries
 from warmslip.io.part_series import write_table
 from warmslip.io.trajectory import Trajectory, state_number
@@ -21,9 +22,9 @@ from warmslip.typing import Array
 
 log = logging.getLogger(__name__)
 
-OWN = re.compile(r"(body|contact)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)")  # the files of a series
+OWN = re.compile(r"(body|contact|contact_points)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)")  # the files of a series
 STEPS = ("newton_iterations", "open", "stick", "slip", "max_penetration", "normal_force")
-CONTACT = ("pressure", "friction traction", "gap", "slip", "status")
+CONTACT = ("pressure", "friction traction", "gap", "slip", "status", *GEOMETRY)
 FIELDS = (*BODY, *CONTACT)
 FORMS = ("vtu", "vtkhdf")
 
@@ -37,14 +38,14 @@ def opened(run: str | Path) -> Trajectory:
 
 
 def contact_at(t: Trajectory, d: Discretisation, number: int) -> dict[str, Array]:
-    """Contact fields of a stored state, see `contact_fields`, and the points' displacement; empty where there are none."""
+    """Contact fields of a stored state, see `contact_fields`, displacement and `geometry` of the points; empty without points."""
     step = t.step_of(number)
     if step < 0 or not len(d.surface.weights):
         return {}
     force, moved, status, gap = (
         np.asarray(t.contact(name, step)) for name in ("force", "displacement", "status", "gap")
     )
-    return contact_fields(d, force, moved, status, gap) | {"displacement": moved}
+    return contact_fields(d, force, moved, status, gap) | {"displacement": moved} | geometry(d)
 
 
 def export(
@@ -65,8 +66,10 @@ def export(
         The folder of `warmslip run`.
     out : str or Path
         The folder to write. With `form` "vtu": body.pvd with body_NNNN.vtu (displacement, velocity, temperature at the nodes;
-        stress and von Mises stress of the cells), contact.pvd with contact_NNNN.vtu (pressure, friction traction on the body,
-        gap, slip and status of the contact points). With "vtkhdf": all states in body.vtkhdf and contact.vtkhdf. In addition
+        stress, von Mises stress and region of the cells), contact.pvd with contact_NNNN.vtu (the contact parts as lines or
+        triangles: pressure, friction traction on the body, gap, slip, status, normal, arc length in the plane, number of the
+        contact table). With "vtkhdf": all states in body.vtkhdf and contact.vtkhdf. With Gauss quadrature the fields of contact
+        are means over facets, and contact_points has the contact points. In addition
         series.csv (resultants, also of every contact part, and balances of every step), and reactions.csv (force and moment
         of every support, resultants of the contact parts and heat flows of every step), where there are any.
     fields : collection of str
@@ -138,8 +141,10 @@ def _there(t: Trajectory, d: Discretisation, fields: Collection[str], warn: Call
     there = {
         **dict.fromkeys(("displacement", "velocity", "stress", "von Mises"), t.u is not None),
         "temperature": t.theta is not None,
+        "region": len(d.scene.regions) > 0,
         **dict.fromkeys(CONTACT, len(d.surface.weights) > 0),
     }
+    there["arc length"] &= d.dim == 2
     missing = [name for name in fields if not there[name]]
     has = ", ".join(name for name in FIELDS if there[name])
     if missing and len(missing) == len(fields):

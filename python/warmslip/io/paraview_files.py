@@ -4,28 +4,48 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import meshio
 import numpy as np
 
-from warmslip.io.vtkhdf import TETRA, TRIANGLE, VERTEX, VtkHdf
+from warmslip.io.contact_mesh import ContactMesh
+from warmslip.io.vtkhdf import VtkHdf
 from warmslip.io.vtu import three
 from warmslip.model.discretisation import Discretisation
 from warmslip.typing import Array
 
+Fields = dict[str, Array]
+
 
 class Series:
-    """States of the body and of its contact points, appended in the order of time; fields are those of `vtu.body_fields`."""
+    """States of the body and of its contact parts, appended in the order of time; fields are those of `vtu.body_fields`.
+
+    The series are `body`, `contact` and, where the fields of `contact` are means over facets, `contact_points`.
+    """
 
     def __init__(self, folder: Path, d: Discretisation) -> None:
-        self._folder, self._points = folder, three(np.asarray(d.surface.positions))
-        self._nodes, self._cells, self._dim = three(np.asarray(d.mesh.nodes)), np.asarray(d.mesh.cells), d.dim
+        self._folder = folder
+        kinds = {2: ("triangle", "line"), 3: ("tetra", "triangle")}[d.dim]
+        self._meshes = {"body": (three(np.asarray(d.mesh.nodes)), kinds[0], np.asarray(d.mesh.cells))}
+        self._contact = None
+        if len(places := np.asarray(d.surface.positions)):
+            self._contact = ContactMesh.of(d)
+            self._meshes["contact"] = (three(self._contact.points), kinds[1], self._contact.cells)
+            self._meshes["contact_points"] = (three(places), "vertex", np.arange(len(places))[:, None])
 
-    def body(self, number: int, time: float, nodal: dict[str, Array], cells: dict[str, Array]) -> None:
-        raise NotImplementedError
+    def body(self, number: int, time: float, nodal: Fields, cells: Fields) -> None:
+        """Appends a state of the body."""
+        self._append("body", number, time, nodal, cells)
 
-    def contact(self, number: int, time: float, fields: dict[str, Array]) -> None:
+    def contact(self, number: int, time: float, fields: Fields) -> None:
+        """Appends fields of the contact points."""
+        assert self._contact is not None
+        self._append("contact", number, time, *self._contact.fields(fields))
+        if self._contact.means is not None:
+            self._append("contact_points", number, time, fields, {})
+
+    def _append(self, name: str, number: int, time: float, points: Fields, cells: Fields) -> None:
         raise NotImplementedError
 
     def close(self) -> None:
@@ -42,30 +62,23 @@ class Series:
 
 
 class VtuSeries(Series):
-    """body_NNNN.vtu, contact_NNNN.vtu, and the index of each, body.pvd and contact.pvd."""
+    """NAME_NNNN.vtu for each state of a series, and its index NAME.pvd."""
 
     def __init__(self, folder: Path, d: Discretisation) -> None:
         super().__init__(folder, d)
-        self._files: dict[str, list[tuple[float, str]]] = {"body": [], "contact": []}
+        self._files: dict[str, list[tuple[float, str]]] = {}
 
-    def body(self, number: int, time: float, nodal: dict[str, Array], cells: dict[str, Array]) -> None:
-        blocks = [("triangle" if self._dim == 2 else "tetra", self._cells)]
-        mesh = meshio.Mesh(self._nodes, blocks, nodal, {name: [values] for name, values in cells.items()})
-        self._write("body", number, time, mesh)
-
-    def contact(self, number: int, time: float, fields: dict[str, Array]) -> None:
-        blocks = [("vertex", np.arange(len(self._points))[:, None])]
-        self._write("contact", number, time, meshio.Mesh(self._points, blocks, fields))
-
-    def _write(self, name: str, number: int, time: float, mesh: Any) -> None:
+    def _append(self, name: str, number: int, time: float, points: Fields, cells: Fields) -> None:
+        places, kind, nodes = self._meshes[name]
         file = f"{name}_{number:04d}.vtu"
-        mesh.write(self._folder / file)
-        self._files[name].append((time, file))
+        of_cells = {field: [values] for field, values in cells.items()}
+        meshio.Mesh(places, [(kind, nodes)], points, of_cells).write(self._folder / file)
+        self._files.setdefault(name, []).append((time, file))
 
     def close(self) -> None:
+        """Writes the indices."""
         for name, files in self._files.items():
-            if files:
-                _index(self._folder / f"{name}.pvd", files)
+            _index(self._folder / f"{name}.pvd", files)
 
 
 def _index(path: Path, files: list[tuple[float, str]]) -> None:
@@ -79,24 +92,19 @@ def _index(path: Path, files: list[tuple[float, str]]) -> None:
 
 
 class HdfSeries(Series):
-    """body.vtkhdf and contact.vtkhdf."""
+    """NAME.vtkhdf for each series."""
 
     def __init__(self, folder: Path, d: Discretisation) -> None:
         super().__init__(folder, d)
         self._files: dict[str, VtkHdf] = {}
 
-    def body(self, number: int, time: float, nodal: dict[str, Array], cells: dict[str, Array]) -> None:
-        if "body" not in self._files:
-            kind = TRIANGLE if self._dim == 2 else TETRA
-            self._files["body"] = VtkHdf(self._folder / "body.vtkhdf", self._nodes, self._cells, kind)
-        self._files["body"].append(time, nodal, cells)
-
-    def contact(self, number: int, time: float, fields: dict[str, Array]) -> None:
-        if "contact" not in self._files:
-            vertices = np.arange(len(self._points))[:, None]
-            self._files["contact"] = VtkHdf(self._folder / "contact.vtkhdf", self._points, vertices, VERTEX)
-        self._files["contact"].append(time, fields, {})
+    def _append(self, name: str, number: int, time: float, points: Fields, cells: Fields) -> None:
+        if name not in self._files:
+            places, kind, nodes = self._meshes[name]
+            self._files[name] = VtkHdf(self._folder / f"{name}.vtkhdf", places, nodes, kind)
+        self._files[name].append(time, points, cells)
 
     def close(self) -> None:
+        """Closes the files."""
         for file in self._files.values():
             file.close()

@@ -23,7 +23,8 @@ MAX_BUFFER_CHARS, MAX_BUFFER_SECONDS = 2**24, 1.0  # held back before it is writ
 class ProbeWriter:
     """Appends the rows of every probe as steps come, and writes them every second.
 
-    A row is a point at the end of a step: `step`, `time`, its place and the components of its fields. Rank 0 alone writes.
+    A row is a point at the end of a step, or in the state that the run begins with, step 0: `step`, `time`, its place and the
+    components of its fields. Rank 0 alone writes.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ class ProbeWriter:
         self._header.add(path)
 
     def step(self, state: State) -> None:
-        """Appends the rows of the step just taken (collective)."""
+        """Appends the rows of the step just taken, or of the state that the run begins with (collective)."""
         for probe in self._probes:
             if state.step % probe.every:
                 continue
@@ -119,10 +120,12 @@ class ProbeWriter:
 def _reaches(steps: list[float], keep: int, points: int) -> bool:
     """Whether rows with these step numbers hold all that was due up to step `keep`; runs before may have had another cadence."""
     found, count = np.unique(steps, return_counts=True)
+    whole = bool((count == points).all())
+    found = found[found > 0]  # the start has a row at every cadence
     if not len(found):
-        return True
+        return whole
     gap = found[-1] - (found[-2] if len(found) > 1 else 0)
-    return bool((count == points).all() and found[-1] + gap > keep)
+    return whole and bool(found[-1] + gap > keep)
 
 
 def _step(line: str) -> float:

@@ -10,8 +10,12 @@ import numpy as np
 
 from warmslip.typing import Array
 
-VERTEX, TRIANGLE, TETRA = 1, 5, 10  # cell types of VTK
-NODES = {VERTEX: 1, TRIANGLE: 3, TETRA: 4}
+TYPES = {
+    "vertex": (1, 1),
+    "line": (3, 2),
+    "triangle": (5, 3),
+    "tetra": (10, 4),
+}  # of VTK by their names in meshio, and nodes
 WHOLE = "i8"
 
 
@@ -26,8 +30,8 @@ class VtkHdf:
         Positions.
     cells : array (cells, nodes)
         Nodes of each cell.
-    kind : int
-        `VERTEX`, `TRIANGLE` or `TETRA`.
+    kind : str
+        One of `TYPES`.
 
     Raises
     ------
@@ -35,9 +39,10 @@ class VtkHdf:
         When the file cannot be written.
     """
 
-    def __init__(self, path: Path, points: Array, cells: Any, kind: int) -> None:
+    def __init__(self, path: Path, points: Array, cells: Any, kind: str) -> None:
         self._file = h5py.File(path, "w")
         self._steps = 0
+        number, nodes = TYPES[kind]
         group = self._group = self._file.create_group("VTKHDF")
         group.attrs["Version"] = np.array([2, 0], dtype=WHOLE)
         group.attrs.create("Type", np.bytes_("UnstructuredGrid"))
@@ -46,8 +51,8 @@ class VtkHdf:
         group["NumberOfConnectivityIds"] = np.array([cells.size], dtype=WHOLE)
         group["Points"] = np.asarray(points, dtype=float)
         group["Connectivity"] = np.asarray(cells, dtype=WHOLE).ravel()
-        group["Offsets"] = np.arange(len(cells) + 1, dtype=WHOLE) * NODES[kind]
-        group["Types"] = np.full(len(cells), kind, dtype="u1")
+        group["Offsets"] = np.arange(len(cells) + 1, dtype=WHOLE) * nodes
+        group["Types"] = np.full(len(cells), number, dtype="u1")
         steps = group.create_group("Steps")
         steps.attrs["NSteps"] = np.int64(0)
         self._grow(steps, "Values", np.empty(0))
@@ -81,7 +86,7 @@ class VtkHdf:
             for name, values in fields.items():
                 begin = len(data[name]) if name in data else 0
                 self._grow(offsets, name, np.array([begin], dtype=WHOLE))
-                self._grow(data, name, np.asarray(values, dtype=float))
+                self._grow(data, name, np.asarray(values, dtype=WHOLE if values.dtype.kind == "i" else float))
         self._steps += 1
         steps.attrs["NSteps"] = np.int64(self._steps)
 

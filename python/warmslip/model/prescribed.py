@@ -30,8 +30,8 @@ class PrescribedContact:
 
     @cached_property
     def _points(self) -> list[tuple[int, Any, Array]]:
-        """Number, nodes and their weights of every contact point on a rigid foundation whose nodes are all held."""
-        held, touched = self.vectors.supports.held, np.zeros(len(self.mesh.nodes), dtype=bool)
+        """Number, nodes and their weights of every contact point on a rigid foundation whose nodes are held across it."""
+        touched = np.zeros(len(self.mesh.nodes), dtype=bool)
         touched[self.vectors.supports.nodes] = True
         of_part = np.asarray(self.surface.contacts, dtype=int)
         out: list[tuple[int, Any, Array]] = []
@@ -45,16 +45,16 @@ class PrescribedContact:
             places = np.asarray(self.surface.positions)[points]
             if contact.quadrature == "nodal":
                 found = _at_nodes(points, places, np.asarray(self.mesh.nodes), np.unique(facets[touched[facets]]))
-                out += [point for point in found if self._across(point)]
             else:
-                out += _on_facets(points, places, np.asarray(self.mesh.nodes), facets[held[facets].all(axis=1)])
+                found = _on_facets(points, places, np.asarray(self.mesh.nodes), facets[touched[facets].all(axis=1)])
+            out += [point for point in found if self._across(point)]
         return out
 
     def _across(self, point: tuple[int, Any, Array]) -> bool:
-        """Whether the node of a point is held along the point's normal."""
+        """Whether the nodes of a point are held along the point's normal."""
         supports, normal = self.vectors.supports, np.asarray(self.surface.normals)[point[0]]
-        projector = supports.projectors[np.searchsorted(supports.nodes, point[1][0])]
-        return bool(np.abs(projector @ normal - normal).max() < ROUNDING)
+        projectors = supports.projectors[np.searchsorted(supports.nodes, point[1])]
+        return bool(np.abs(projectors @ normal - normal).max() < ROUNDING)
 
     @property
     def of_time(self) -> bool:

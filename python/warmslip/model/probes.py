@@ -15,6 +15,7 @@ from warmslip.scene.scene import Scene
 from warmslip.typing import Array
 
 NODAL = {"displacement": "u", "velocity": "w", "temperature": "theta"}
+FORCES = ("pressure", "friction traction", "status")  # of a step: the state that a run begins with has none
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,10 @@ class Probe:
     contact: Any = None
 
     def columns(self, state: State) -> dict[str, Array]:
-        """Every column with its values, (points,): places, then a column for each component of a field (collective)."""
+        """Every column with its values, (points,): places, then a column for each component of a field (collective).
+
+        Pressure, friction traction and status of the state that a run begins with are nan.
+        """
         axes = "xyz"[: self.positions.shape[1]]
         out = {} if self.length is None else {"length": self.length}
         out |= {axis: self.positions[:, i] for i, axis in enumerate(axes)}
@@ -74,6 +78,8 @@ class Probe:
             values = np.einsum("pi,pi...->p...", self.weights, values)
         else:
             values = state.contact[name][self.contact]
+            if state.step == 0 and name in FORCES:
+                values = np.full_like(values, np.nan)
         if values.ndim == 1:
             return {column: values}
         return {f"{column}_{axis}": values[:, i] for i, axis in enumerate(axes)}

@@ -86,6 +86,10 @@ def supports(scene: Scene, loads: Loads, mesh: Any) -> list[Support]:
     return out
 
 
+class SupportsContradictError(ValueError):
+    """Supports give a common node displacements that contradict each other."""
+
+
 class _Normals:
     """Normals of the nodes of several parts together, so that a surface may be cut into parts; (facets, areas) of each part."""
 
@@ -232,7 +236,7 @@ class Supports:
 
         Raises
         ------
-        ValueError
+        SupportsContradictError
             Where supports contradict each other.
         """
         out = np.zeros((len(self.nodes), self.positions.shape[1]))
@@ -245,7 +249,7 @@ class Supports:
             out[at] = np.einsum("naf,nf->na", inverse, given[forms])
             left = np.abs(np.einsum("nfa,na->nf", directions[forms], out[at]) - given[forms]).max(axis=1)
             if (left > same).any():
-                raise ValueError(self._conflict(int(at[left.argmax()]), where, number, given, t))
+                raise SupportsContradictError(self._conflict(int(at[left.argmax()]), where, number, given, t))
         return out
 
     def _values(self, t: float, evaluate: Evaluate) -> list[Array]:

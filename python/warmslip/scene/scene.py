@@ -12,7 +12,7 @@ from pydantic import ValidationError, model_validator
 
 from warmslip.mesh import files
 from warmslip.messages import Shown, quoted
-from warmslip.scene.errors import refusal, validated
+from warmslip.scene.errors import SceneError, refusal, validated
 from warmslip.scene.overrides import replace
 from warmslip.scene.tables import SceneTables
 from warmslip.scene.validation import problems
@@ -27,6 +27,26 @@ class Scene(Shown, SceneTables):
             super().__init__(**tables)
         except ValidationError as error:
             raise refusal(error, tables, type(self)) from None
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """The scene of some tables, with the options of pydantic. Raises SceneError."""
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise refusal(error, obj, cls) from None
+
+    @classmethod
+    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
+        """The scene of some tables as JSON, with the options of pydantic. Raises SceneError."""
+        try:
+            return super().model_validate_json(json_data, **options)
+        except ValidationError as error:
+            try:
+                data = json.loads(json_data)
+            except ValueError as wrong:
+                raise SceneError(f"the scene is no JSON ({wrong}); correct it") from None
+            raise refusal(error, data, cls) from None
 
     def _facts(self) -> dict[str, str]:
         mesh, time = self.mesh, self.time

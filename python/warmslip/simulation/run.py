@@ -150,6 +150,8 @@ def run(
     ):
         if resume and folder is not None:
             _clear(folder)  # all that goes on is there
+        if not begin:
+            probe_writer.step(State(simulation.discretisation, simulation.stepper, 0))
         for state, report in simulation.steps():
             writer.step(report, simulation.taken)
             probe_writer.step(state)

@@ -17,6 +17,7 @@ from warmslip.model.contact_laws import Law
 from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.model.loads import Loads
 from warmslip.model.state import State
+from warmslip.model.supports import SupportsContradictError
 from warmslip.records import provenance
 from warmslip.scene.scene import Scene
 from warmslip.simulation import checkpoint, pace, ranks
@@ -167,6 +168,8 @@ class Simulation(Shown):
         prescribed = self.discretisation.prescribed
         try:
             loads = self.discretisation.load_vectors.at(step.time, step.size)
+        except SupportsContradictError as error:  # on every rank
+            return self._stop("supports_contradict", step.number, str(error))
         except ValueError as error:  # a formula that gives no finite number; on every rank
             return self._stop("data_not_finite", step.number, str(error))
         if prescribed.of_time and (why := prescribed.inside(step.time)):

@@ -74,8 +74,8 @@ def run(
     -------
     Result
         Also of a run that stopped early: `outcome` is then one of contact_not_converged, not_finite, data_not_finite,
-        support_inside_foundation, law_failed, balance_violated, precision_lost, unsupported, solver_failed, or interrupted
-        (Ctrl-C, SIGTERM). `failure` in the summary describes the step that was rejected.
+        supports_contradict, support_inside_foundation, law_failed, balance_violated, precision_lost, unsupported,
+        solver_failed, or interrupted (Ctrl-C, SIGTERM). `failure` in the summary describes the step that was rejected.
 
     Raises
     ------

@@ -60,7 +60,7 @@ def test_the_file_holds_the_series(name: str, tmp_path: Path) -> None:
             points, nodal, cells = state(path, step)
             assert np.array_equal(points, mesh.points)
             assert np.array_equal(connectivity, mesh.cells[0].data.ravel())
-            assert kind == {"vertex": 1, "triangle": 5, "tetra": 10}[mesh.cells[0].type]
+            assert kind == {"line": 3, "triangle": 5, "tetra": 10}[mesh.cells[0].type]
             assert nodal.keys() == mesh.point_data.keys() and cells.keys() == mesh.cell_data.keys()
             for field, values in mesh.point_data.items():
                 assert np.array_equal(nodal[field], values), field

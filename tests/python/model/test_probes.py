@@ -13,6 +13,7 @@ from support.stopped import KilledError, stop_after
 import warmslip
 from warmslip import SceneError, _core
 from warmslip.figures import draw
+from warmslip.figures.probe import probe as probe_figure
 from warmslip.model.meshes import make_mesh
 from warmslip.model.probes import probes
 from warmslip.records import tables
@@ -51,7 +52,7 @@ def test_values_at_points_and_on_lines(tmp_path: Path) -> None:
     one = square(probing, contact=None, supports__displacement=all_sides, supports__temperature=warm)
     warmslip.run(one, out=tmp_path)
     rows = table(tmp_path, "point")
-    assert [row["step"] for row in rows] == [1, 2, 3, 4, 5, 6]
+    assert [row["step"] for row in rows] == [0, 1, 2, 3, 4, 5, 6]
     lam, mu = 10 * 0.3 / (1.3 * 0.4), 10 / 2.6
     for row in rows:
         x, y, t = row["x"], row["y"], row["time"]
@@ -59,8 +60,8 @@ def test_values_at_points_and_on_lines(tmp_path: Path) -> None:
         exact = {
             "displacement_x": 0.01 * t * x,
             "displacement_y": 0.02 * t * y,
-            "velocity_x": 0.01 * x,
-            "velocity_y": 0.02 * y,
+            "velocity_x": 0.01 * x * (t > 0),
+            "velocity_y": 0.02 * y * (t > 0),
             "temperature": x + 2 * y + 1,
             "stress_xx": (0.03 * lam + 0.02 * mu) * t,
             "stress_xy": 0.0,
@@ -70,13 +71,13 @@ def test_values_at_points_and_on_lines(tmp_path: Path) -> None:
         assert set(row) == {"step", "time", "x", "y", "von_mises", *exact}
         for name, value in exact.items():
             assert row[name] == pytest.approx(value, rel=1e-12, abs=1e-14), name
-        s = np.diag([row["stress_xx"], row["stress_yy"], row["stress_zz"]])
+        s = np.diag([float(row[f"stress_{a}"]) for a in ("xx", "yy", "zz")])
         s -= np.trace(s) / 3 * np.eye(3)
         assert row["von_mises"] == pytest.approx(np.sqrt(1.5 * (s * s).sum()), rel=1e-12)
     rows = table(tmp_path, "line")
-    assert [row["step"] for row in rows] == [4] * 7
-    assert np.allclose([row["length"] for row in rows], np.linspace(0, 1, 7), rtol=0, atol=1e-15)
-    assert np.allclose([row["y"] for row in rows], np.linspace(0.9, 0.1, 7))
+    assert [row["step"] for row in rows] == [0] * 7 + [4] * 7
+    assert np.allclose([row["length"] for row in rows], 2 * [*np.linspace(0, 1, 7)], rtol=0, atol=1e-15)
+    assert np.allclose([row["y"] for row in rows], 2 * [*np.linspace(0.9, 0.1, 7)])
     for row in rows:
         assert row["temperature"] == pytest.approx(row["x"] + 2 * row["y"] + 1, rel=1e-13)
 
@@ -116,7 +117,10 @@ def test_a_contact_part_has_its_points_in_order(tmp_path: Path) -> None:
     assert np.array_equal(np.sort(x), probe.positions[:, 0]) and np.array_equal(np.sort(x), probe.length)
     assert not np.array_equal(np.sort(x), x) or len(x) == 8
     rows = table(tmp_path, "edge")
-    assert len(rows) == 6 * 8
+    assert len(rows) == 7 * 8
+    begin, rows = rows[:8], rows[8:]
+    assert all(np.isnan(row[name]) for row in begin for name in ("pressure", "friction_traction_x", "status"))
+    assert all(row["time"] == row["gap"] == row["slip_x"] == 0 for row in begin)
     for i, (contact, _) in enumerate(seen):
         here = rows[8 * i : 8 * i + 8]
         order = np.argsort(x)
@@ -156,7 +160,7 @@ def test_a_part_in_space(tmp_path: Path) -> None:
     seen: list[Any] = []
     warmslip.run(one, out=tmp_path, observers=[lambda state, _: seen.append(state.contact)])
     rows = table(tmp_path, "all")
-    assert [row["slip_z"] for row in rows] == seen[0]["slip"][:, 2].tolist()
+    assert [row["slip_z"] for row in rows] == [0.0] * len(seen[0]["slip"]) + seen[0]["slip"][:, 2].tolist()
     assert "length" not in rows[0] and {"x", "y", "z", "stress_yz"} <= rows[0].keys()
 
 
@@ -209,8 +213,8 @@ def test_names_and_fields_that_are_not_there_are_refused() -> None:
 
 
 def test_a_resumed_run_leaves_no_gap_and_no_double_row(tmp_path: Path) -> None:
-    one = square({"point": POINT, "line": LINE | {"every": 2}, "edge": {"part": "bottom"}}, output__checkpoint=2)
-    one = one.override(**{"time.steps": 9})
+    named = {"point": POINT, "line": LINE | {"every": 2}, "edge": {"part": "bottom"}, "rare": POINT | {"every": 7}}
+    one = square(named, output__checkpoint=2).override(**{"time.steps": 9})
     warmslip.run(one, out=tmp_path / "whole")
     for stop in (1, 3, 5, 8):
         torn = tmp_path / f"torn{stop}"
@@ -219,7 +223,7 @@ def test_a_resumed_run_leaves_no_gap_and_no_double_row(tmp_path: Path) -> None:
         with (torn / "probes/point.csv").open("a") as file:
             file.write(f"{stop + 1},0.5,0.1")  # a row that was being written
         warmslip.run(one, out=torn, resume=True)
-        for name in ("point", "line", "edge"):
+        for name in named:
             assert (torn / f"probes/{name}.csv").read_text() == (tmp_path / f"whole/probes/{name}.csv").read_text()
 
 
@@ -241,7 +245,7 @@ def test_a_run_that_goes_on_may_change_its_probes(tmp_path: Path) -> None:
         probes = {"point": POINT | {"every": 2}, "new": POINT}
         longer = one.override(**{"time.steps": steps, "time.end": end, "output.probes": probes})
         assert warmslip.run(longer, out=tmp_path, resume=True).completed
-    assert [int(row["step"]) for row in table(tmp_path, "point")] == [5, 10, 14, 16, 18, 20, 22]
+    assert [int(row["step"]) for row in table(tmp_path, "point")] == [0, 5, 10, 14, 16, 18, 20, 22]
     assert [int(row["step"]) for row in table(tmp_path, "new")] == list(range(13, 24))
 
 
@@ -260,18 +264,24 @@ def test_a_new_run_has_no_table_of_an_earlier_one(tmp_path: Path) -> None:
     warmslip.run(square({"point": POINT, "other": POINT}), out=tmp_path)
     warmslip.run(square({"point": POINT}, time__steps=2), out=tmp_path)
     assert [path.name for path in (tmp_path / "probes").iterdir()] == ["point.csv"]
-    assert len(table(tmp_path, "point")) == 2
+    assert len(table(tmp_path, "point")) == 3
 
 
 def test_drawings(tmp_path: Path) -> None:
-    one = square({"point": POINT, "line": LINE | {"fields": ["displacement"]}})
+    one = square({"point": POINT, "line": LINE | {"fields": ["displacement"]}, "edge": {"part": "bottom"}})
     warmslip.run(one, out=tmp_path)
     files = [tmp_path / f"probes/{name}.csv" for name in ("point", "line")]
     draw("probe", files, tmp_path / "probe.png")
     caption = (tmp_path / "probe.rst").read_text()
     values = [row["temperature"] for row in table(tmp_path, "point")]
     assert f"temperature {min(values):.3g} to {max(values):.3g}" in caption
-    assert "line, 6 steps: displacement_x" in caption
+    assert "line, 7 times: displacement_x" in caption
+    draw("probe", [tmp_path / "probes/edge.csv"], tmp_path / "edge.png")
+    figure, _ = probe_figure([tmp_path / "probes/edge.csv"])
+    labels = {ax.get_title(): ax.get_xlabel() for ax in figure.axes}
+    assert "t = 0, " in labels["edge: gap"] and "t = 0.167, " in labels["edge: pressure"]
+    pressure = [row["pressure"] for row in table(tmp_path, "edge") if row["step"]]
+    assert f"pressure {min(pressure):.3g} to {max(pressure):.3g}" in (tmp_path / "edge.rst").read_text()
     with pytest.raises(ValueError, match="'probe' is drawn from"):
         draw("probe", [tmp_path / "probe.rst"], tmp_path / "none.png")
 
@@ -287,11 +297,12 @@ def test_two_ranks_write_the_tables_of_one(command: Command, tmp_path: Path) -> 
     options = [word for key in keys for word in ("--set", key)]
     for ranks in (1, 2):
         assert command("run", "paper_mixed", *options, "--out", f"run{ranks}", ranks=ranks).returncode == 0
-    for name, rows in (("inner", 3), ("line", 15), ("edge", 21)):
+    for name, rows in (("inner", 4), ("line", 20), ("edge", 28)):
         one, two = (table(tmp_path / f"run{ranks}", name) for ranks in (1, 2))
         assert len(one) == len(two) == rows and one[0].keys() == two[0].keys()
         for column in one[0]:
-            a, b = (np.array([row[column] for row in found]) for found in (one, two))
+            a, b = (np.nan_to_num([row[column] for row in found]) for found in (one, two))
+            assert [np.isnan(row[column]) for row in one] == [np.isnan(row[column]) for row in two]
             assert np.abs(a - b).max() <= 1e-11 * max(np.abs(a).max(), 1e-3), column
     with (
         warmslip.Trajectory(tmp_path / "run1/trajectory.h5") as first,
@@ -304,3 +315,34 @@ def test_two_ranks_write_the_tables_of_one(command: Command, tmp_path: Path) -> 
             assert np.abs(a - second.heat_flows[name]).max() <= 1e-11 * max(np.abs(a).max(), 1e-3), name
     refused = command("run", "paper_mixed", "--set", "output.probes.far.at=[0.5,1.5]", ranks=2)
     assert refused.returncode != 0 and "at a distance of 0.5; correct the place" in refused.stderr
+
+
+def test_the_first_row_is_the_state_that_the_run_begins_with(tmp_path: Path) -> None:
+    """Of a scene, and of another run: as the first state of the trajectory."""
+    warm = {
+        "initial": {"temperature": "x + 2 * y + 1", "displacement": ["0.01 * x", "0"], "velocity": ["0.1", "0.2 * y"]}
+    }
+    sides = {
+        side: [f"0.01 * x + {speed} * t", "0.2 * y * t"]
+        for side, speed in (("left", 0.1), ("right", 0.1), ("top", 0.1))
+    }
+    named = {"point": POINT, "rare": POINT | {"every": 4}}
+    one = build(SQUARE | warm | {"inertia": {"density": 1.0}, "output": {"probes": named}})
+    one = one.override(**{"supports.displacement": sides})
+    warmslip.run(one, out=tmp_path / "first")
+    more = one.override(**{"initial": {"from": str(tmp_path / "first/trajectory.h5")}, "supports.displacement": None})
+    warmslip.run(more, out=tmp_path / "more")
+    for folder in ("first", "more"):
+        with warmslip.Trajectory(tmp_path / folder / "trajectory.h5") as t:
+            state = t.state(time=0.0)
+            (probe, _) = probes(state.discretisation)
+            begin = {"u": t.u[0], "w": t.w[0], "theta": t.theta[0]}
+        row = table(tmp_path / folder, "point")[0]
+        assert (row["step"], row["time"]) == (0, 0)
+        for name, key in (("displacement_x", "u"), ("velocity_y", "w"), ("temperature", "theta")):
+            values = np.asarray(begin[key])[probe.nodes]
+            values = values if key == "theta" else values[..., 0 if key == "u" else 1]
+            assert row[name] == pytest.approx(float((probe.weights * values).sum()), rel=1e-13), (folder, name)
+            assert abs(row[name]) > 1e-4
+        assert row["stress_xx"] == pytest.approx((probe.average @ state.stress.reshape(-1, 4))[0, 0], rel=1e-12)
+        assert [row["step"] for row in table(tmp_path / folder, "rare")] == [0, 4]

@@ -265,3 +265,32 @@ def test_a_list_is_given_as_a_whole() -> None:
     with pytest.raises(SceneError, match=r"give the whole list, loads.body=\[...\]"):
         load("paper_mixed", ["loads.body.1=2"])
     assert load("paper_mixed").override(**{"mesh.n": np.int64(4), "loads.body": np.zeros(2)}).mesh.n == 4
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"mesh": {"n": "x"}, "time": {}, "heat": {"conductivity": 1.0}},
+        {"mesh": {"n": 4}, "time": {}, "heat": {"conductivitie": 1.0}},
+        {"mesh": 3},
+        {"mesh": {"n": 4}, "time": {}, "supports": {"temperature": ["lid"]}, "heat": {"conductivity": 1.0}},
+    ],
+)
+def test_every_way_to_a_scene_refuses_with_the_same_words(tables: dict[str, Any]) -> None:
+    """The constructor and the two readers that the class inherits."""
+    ways = (
+        lambda: Scene(**tables),
+        lambda: Scene.model_validate(tables),
+        lambda: Scene.model_validate_json(json.dumps(tables)),
+        lambda: build(tables),
+    )
+    said = set()
+    for way in ways:
+        with pytest.raises(SceneError) as refused:
+            way()
+        said.add(str(refused.value))
+    assert len(said) == 1 and "validation error" not in said.pop()
+    good = {"mesh": {"n": 4}, "time": {}, "heat": {"conductivity": 1.0}}
+    assert Scene.model_validate(good) == Scene.model_validate_json(json.dumps(good)) == build(good)
+    with pytest.raises(SceneError, match="the scene is no JSON"):
+        Scene.model_validate_json("{")
