@@ -1,6 +1,6 @@
 """The campaign as a command: sample, run, judge, and tables of what came out.
 
-    make extremes                                        all of it, half an hour on two cores
+    make extremes                                        all of it, about ten minutes
     make extremes ARGS="--families supported free --count 64"
     make extremes ARGS="--scene laws:50"                 one scene: its file and what the judge says
 
