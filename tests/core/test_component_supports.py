@@ -224,6 +224,46 @@ def springs_and_dashpots_are_what_they_say(d: int) -> None:
 
 
 @check
+def a_body_with_inertia_turns_about_the_points_that_hold_it(d: int) -> None:
+    """A held corner, a hinge, a corner that moves: as with a spring too weak to matter, which leaves no rigid motion."""
+    corner, other = [0.0] * (d - 1) + [1.0], [0.0] * (d - 2) + [1.0, 1.0]
+    moving = ["0.01 * sin(3 * t)", *["0.002 * t"] * (d - 1)]
+    held: list[list[dict[str, Any]]] = [
+        [{"at": corner}],
+        [{"at": corner, "displacement": moving}],
+        [{"at": corner, "displacement": ["free", *[0.0] * (d - 1)]}],
+    ]
+    if d == 3:
+        held.append([{"at": corner}, {"at": other}])
+    warm = {"conductivity": 1.0, "capacity": 1.0, "expansion": {"tensor": 0.1}, "heating": {"tensor": -0.1}}
+    for points in held:
+        for density, coupling in [(1e-3, "staggered"), (1.0, "monolithic"), (1e3, "staggered"), (1e6, "lagged")]:
+            one = pressed(
+                d,
+                {},
+                n=3 if d == 2 else 2,
+                supports={"points": points},
+                time={"steps": 3, "coupling": coupling},
+                inertia={"density": density},
+                loads={"body": along(d, -2e-3, -1e-3)},
+                heat=warm,
+            )
+            simulation = completed(one)
+            assert simulation.stepper.cost.refinements == 0
+            u = field(simulation, "u")
+            x = np.asarray(simulation.discretisation.mesh.nodes)
+            end = [0.01 * np.sin(3.0), *[0.002] * (d - 1)]
+            for point in points:
+                here = np.argmin(np.abs(x - point["at"]).max(axis=1))
+                for value, given, exact in zip(u[here], point.get("displacement", [0.0] * d), end, strict=True):
+                    if given != "free":
+                        assert abs(value - (exact if given else 0.0)) <= 1e-15 * max(1.0, np.abs(u).max())
+            springs = {"springs": {"top": {"stiffness": 1e-11}}}
+            near = field(completed(one.override(supports={"points": points} | springs), digits=0.0), "u")
+            assert np.abs(near - u).max() <= 1e-6 * np.abs(u).max(), (points, density)
+
+
+@check
 def weak_and_stiff_springs(d: int) -> None:
     """Springs that only keep a pressed body from sliding away leave its weight to the contact; stiff ones guide it.
 

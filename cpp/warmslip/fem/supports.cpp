@@ -92,12 +92,26 @@ Eigen::VectorXd support_scales(const Layout<d>& layout, const std::vector<HeldNo
   return scales.size() ? layout.sum(std::move(scales)) : scales;
 }
 
+template <int d>
+void release(const Layout<d>& layout, const std::vector<PetscInt>& prescribed, const std::vector<HeldNode<d>>& inclined,
+             Vec v) {
+  const PetscInt first = layout.owned() ? layout.global_nodes()[0] : 0;
+  Values values(v);
+  for (const PetscInt i : prescribed) (*values)[i - first * d] = 0;
+  for (const HeldNode<d>& one : inclined) {
+    if (!owns(layout, one.node)) continue;
+    auto here = (*values).template segment<d>((layout.global_of(one.node) - first) * d);
+    here -= (one.held * here).eval();
+  }
+}
+
 #define WARMSLIP_INSTANTIATE(d)                                                                                      \
   template std::pair<std::vector<PetscInt>, std::vector<HeldNode<d>>> held_unknowns<d>(const Layout<d>&,             \
                                                                                        const Problem<d>&);           \
   template void add_springs<d>(const Layout<d>&, const Problem<d>&, double, double, const Projectors<d>&, int, Mat); \
   template void add_held<d>(const Layout<d>&, const std::vector<HeldNode<d>>&, int, Mat);                            \
-  template Eigen::VectorXd support_scales<d>(const Layout<d>&, const std::vector<HeldNode<d>>&, Mat, int);
+  template Eigen::VectorXd support_scales<d>(const Layout<d>&, const std::vector<HeldNode<d>>&, Mat, int);           \
+  template void release<d>(const Layout<d>&, const std::vector<PetscInt>&, const std::vector<HeldNode<d>>&, Vec);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

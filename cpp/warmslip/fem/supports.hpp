@@ -56,4 +56,9 @@ void add_held(const Layout<d>& layout, const std::vector<HeldNode<d>>& inclined,
 template <int d>
 Eigen::VectorXd support_scales(const Layout<d>& layout, const std::vector<HeldNode<d>>& inclined, Mat a, int width);
 
+/// Takes the held directions, those of held_unknowns, out of a vector with d unknowns a node.
+template <int d>
+void release(const Layout<d>& layout, const std::vector<PetscInt>& prescribed, const std::vector<HeldNode<d>>& inclined,
+             Vec v);
+
 }  // namespace warmslip

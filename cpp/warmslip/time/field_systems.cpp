@@ -60,12 +60,12 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
     multiply(operators_.inertia, seen, correction_w_);
     WARMSLIP_PETSC(VecAXPY(out, 1 / k, correction_w_));
   }
+  const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_w_, out); };
+  if (loads.support_velocity) less(operators_.inertia, 1 / k, loads.support_velocity);
   if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
   if (now_.elastic_u) WARMSLIP_PETSC(VecAXPY(out, -1, now_.elastic_u));
   if (!monolithic() && now_.expansion_theta) WARMSLIP_PETSC(VecAXPY(out, 1, now_.expansion_theta));
-  const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_w_, out); };
   if (loads.support_velocity) {
-    less(operators_.inertia, 1 / k, loads.support_velocity);
     less(operators_.viscosity, 1, loads.support_velocity);
     less(operators_.elasticity, k, loads.support_velocity);
   }
@@ -76,18 +76,17 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
 // The held directions of a right-hand side of the motion: the given velocity, or zero.
 template <int d>
 void Stepper<d>::hold(Vec v, Vec given) const {
+  release(layout_, operators_.prescribed_displacement, operators_.inclined, v);
+  if (!given) return;
   fix(v, operators_.prescribed_displacement, given);
   const PetscInt first = layout_.owned() ? layout_.global_nodes()[0] : 0;
   Values values(v), known(given);
   for (std::size_t i = 0; i < operators_.inclined.size(); ++i) {
     const HeldNode<d>& one = operators_.inclined[i];
     if (!owns(layout_, one.node)) continue;
-    const PetscInt at = layout_.global_of(one.node) - first;
-    auto here = (*values).template segment<d>(at * d);
-    here -= (one.held * here).eval();
-    if (given)
-      here += systems_->support_scales[static_cast<Eigen::Index>(i)] *
-              (one.held * (*known).template segment<d>(at * d)).eval();
+    const PetscInt at = (layout_.global_of(one.node) - first) * d;
+    (*values).template segment<d>(at) +=
+        systems_->support_scales[static_cast<Eigen::Index>(i)] * (one.held * (*known).template segment<d>(at)).eval();
   }
 }
 

@@ -43,7 +43,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),
-        s0(before.shape()), reactions(reactions_), springs(springs_), dashpots(dashpots_);
+        s0(before.shape()), reactions(reactions_), springs(springs_), dashpots(dashpots_),
+        supported(in.support_velocity);
     for (PetscInt i = 0; i < layout_.owned(); ++i) {
       const Point<d> position =
           layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_;
@@ -73,6 +74,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
             fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
       if (held) {
         const Point<d> reaction = *held * left;
+        const double missed = size(*held * (way - at(*supported)));  // what supports prescribe
+        if (missed > 0) raise(backward, missed / w_both);
         force.add(position, external + springy - reaction, magnitude);
         l.support_work += in.k * reaction.dot(way);
         (*reactions).template segment<d>(i * d) = reaction;

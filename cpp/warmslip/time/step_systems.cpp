@@ -135,6 +135,7 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
   rigid.prepare(*momentum, [&](Vec x, Vec y) {
     multiply(operators.inertia, x, y);
     WARMSLIP_PETSC(VecScale(y, 1 / k));
+    release(layout, operators.prescribed_displacement, operators.inclined, y);  // a turn about a held node
   });
   if (symmetry == Symmetry::definite_or_refused && !rigid.holds()) throw std::invalid_argument(indefinite_coupling);
 }

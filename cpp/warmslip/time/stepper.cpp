@@ -201,7 +201,8 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           contact.force,
           free_,
           loads.foundation,
-          drive_};
+          drive_,
+          loads.support_velocity};
 }
 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.
