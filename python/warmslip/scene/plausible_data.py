@@ -90,7 +90,7 @@ def _idle(scene: Scene) -> Iterator[str]:
         initial.displacement,
         initial.velocity,
         initial.run,
-        scene.supports.moved,
+        scene.supports.given,
     ]
     gaps = [c.gap for c in scene.contacts if c.stiffness and (not isinstance(c.gap, float | int) or c.gap < 0)]
     belts = [c.velocity for c in scene.contacts]

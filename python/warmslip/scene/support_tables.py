@@ -101,6 +101,14 @@ class SupportsTable(Table):
         return self.displacement if isinstance(self.displacement, dict) else {}
 
     @property
+    def given(self) -> list[float | str]:
+        """The displacements that parts and points are held at, by component or along a normal."""
+        held: list[float | str] = []
+        for one in [*self.moved.values(), *(point.displacement or [] for point in self.points or [])]:
+            held += [one.normal] if isinstance(one, NormalTable) else [value for value in one if value != "free"]
+        return held
+
+    @property
     def clamped(self) -> list[str]:
         """Parts with a given displacement in all directions."""
         if not isinstance(self.displacement, dict):

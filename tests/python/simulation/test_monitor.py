@@ -40,10 +40,20 @@ COUPLED: dict[str, Any] = {
 }
 
 
+TURNED = {  # a corner that moves and turns the body
+    **{key: value for key, value in FALLING.items() if key not in ("initial", "contact")},
+    "supports": {"points": [{"at": [0.0, 1.0], "displacement": ["0.001 * t", 0.0]}]},
+}
 BEFORE = [  # scene, what is said before and after the run; None: nothing
     (body(PRESSED), None),
     (body(WARM), None),
     (body(PRESSED, supports__displacement=["top"]), "nothing acts: there is no load"),
+    (
+        body(PRESSED, supports__displacement={"top": ["free", 0.0], "left": {"normal": 0.0}}),
+        "nothing acts: there is no",
+    ),
+    (body(PRESSED, supports__displacement={"top": ["free", "-0.005 * t"], "left": [0.0, "free"]}), None),
+    (body(TURNED), None),
     (body(WARM, contact__heat_exchange__foundation_temperature=20.0), "nothing acts: there is no load"),
     (body(WARM, contact__heat_exchange__foundation_temperature=21.0), None),
     (body(PRESSED, contact__friction__coefficient=2.5), "the friction coefficient of 'bottom' is 2.5: dry solids have"),
