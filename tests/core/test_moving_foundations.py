@@ -72,6 +72,40 @@ def the_belt_pays_for_what_it_moves(d: int) -> None:
 
 
 @check
+def a_slow_belt_under_a_symmetry_plane(d: int) -> None:
+    """Nodes that a roller holds along the belt slip at its speed, however low: their friction is at its bound."""
+    for quadrature in ("nodal", "gauss-2"):
+        for stiffness in ("rigid", 1000.0):
+            for speed in (1e-4, 1e-7, 1e-10, 1e-13)[: 4 if quadrature == "nodal" else 2]:
+                one = scene(
+                    d,
+                    2,
+                    elasticity=elasticity(d, 1.0, 0.3),
+                    loads={"body": along(d, -1e-3, -1e-3)},
+                    supports={"displacement": {"left": [0.0, *["free"] * (d - 1)]}}
+                    | ({} if d == 2 else {"points": [{"at": [1.0, 0.5, 0.5], "displacement": ["free", 0.0, "free"]}]}),
+                    contact={
+                        "part": "bottom",
+                        "stiffness": stiffness,
+                        "quadrature": quadrature,
+                        "friction": {"coefficient": 1.0},
+                        "velocity": along(d, 0.0, speed),
+                    },
+                )
+                run = completed(one, digits=6)
+                surface = run.discretisation.surface
+                if quadrature == "gauss-2":
+                    continue  # no point has held nodes alone
+                held = np.asarray(surface.positions)[:, 0] == 0
+                force, normals = forces_of(run)[held], np.asarray(surface.normals)[held]
+                pressing = np.sum(force * normals, axis=1)
+                rubbing = force - pressing[:, None] * normals
+                assert pressing.max() > 1e-5
+                assert np.abs(np.linalg.norm(rubbing, axis=1) - pressing).max() <= 1e-10 * pressing.max()
+                assert (rubbing[:, 0] <= 0).all()
+
+
+@check
 def velocities_across_the_surface_do_nothing(d: int) -> None:
     still, rising = (completed(block(d, along(d, up, 0.2), [0.0] * d, stiffness=1000.0), digits=6) for up in (0.0, 3.0))
     assert np.abs(field(still, "u") - field(rising, "u")).max() <= 1e-14

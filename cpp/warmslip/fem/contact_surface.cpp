@@ -231,7 +231,7 @@ Eigen::VectorXd ContactSurface<d>::to_nodes(const Eigen::VectorXd& forces) const
 
 template <int d>
 Eigen::MatrixXd ContactSurface<d>::at_points(const Eigen::MatrixXd& compliance) const {
-  constexpr double lent = 1e-3;
+  constexpr double lent = 1e-11;  // a slip that it explains is rounding of the motion
   const Eigen::MatrixXd free = (free_ * compliance) * free_;
   const Eigen::MatrixXd half = shape_ * free;
   Eigen::MatrixXd out = half * shape_.transpose();
