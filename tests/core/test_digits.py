@@ -122,6 +122,39 @@ def rounding_of_a_slide_along_an_oblique_foundation(d: int) -> None:
 
 
 @check
+def gauss_points_of_a_body_on_weak_springs(d: int) -> None:
+    """Springs that hold a pressed body hardly at all change nothing; what the contact solver leaves of its motion is said."""
+
+    def pressed(spring: float, stiffness: float | str) -> Simulation:
+        planes = {"left": [0.0, *["free"] * (d - 1)]} | ({"front": ["free", 0.0, "free"]} if d == 3 else {})
+        springs = {"springs": {"top": {"stiffness": spring}}} if spring else {}
+        simulation = Simulation(
+            scene(
+                d,
+                4 if d == 2 else 2,
+                time={"steps": 1},
+                elasticity=elasticity(d, 1.0, 0.3),
+                loads={"body": along(d, -1e-3)},
+                supports={"displacement": planes} | springs,
+                contact={"part": "bottom", "stiffness": stiffness, "quadrature": "gauss-2"},
+            )
+        )
+        for _ in simulation.steps():
+            pass
+        return simulation
+
+    for stiffness in ("rigid", 100.0):
+        free = field(pressed(0.0, stiffness), "u")
+        for spring in (1e-6, 1e-9, 1e-10, 1e-11):
+            simulation = pressed(spring, stiffness)
+            if simulation.outcome == "precision_lost":
+                assert stiffness == "rigid" and spring < 1e-9
+                continue
+            error = np.abs(field(simulation, "u") - free).max() / np.abs(free).max()
+            assert error <= max(10 * spring, 10 ** (1 - summary(simulation)["digits"]["u"])), (stiffness, spring, error)
+
+
+@check
 def friction_heat_of_a_light_touch(d: int) -> None:
     """The temperature comes from a contact force of few digits, and has no more."""
 

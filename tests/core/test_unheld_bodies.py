@@ -256,6 +256,33 @@ def what_held_it_lets_it_fly(d: int) -> None:
         assert momentum[-1] == pytest.approx(density * 0.1**d * (-0.1 - 9.81 * end), rel=1e-12)
 
 
+@check
+def cohesion_and_a_curved_gap(d: int) -> None:
+    """Bodies with a lent mass and bodies without one do not call each other's solvers for ever."""
+    for quadrature in ("nodal", "gauss-2"):
+        guided = scene(
+            d,
+            [5, 1] if d == 2 else [2, 2, 1],
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.3),
+            loads={"body": along(d, -1e-4)},
+            supports={"displacement": {"top": [*["free"] * (d - 1), "-1e-5 * t"]}},
+            contact={
+                "part": "bottom",
+                "stiffness": "rigid",
+                "quadrature": quadrature,
+                "friction": {"coefficient": 0.3, "cohesion": 1e-6},
+                "gap": {"shape": "sphere", "at": [*[0.3] * (d - 1), -7.47], "radius": 7.47}
+                if d == 3
+                else {"shape": "cylinder", "at": [0.3, -7.47], "radius": 7.47},
+            },
+        )
+        simulation = Simulation(guided)
+        for _, report in simulation.steps():
+            assert report.newton_iterations < 2000
+        assert simulation.outcome in ("completed", "unsupported"), simulation.failure
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 

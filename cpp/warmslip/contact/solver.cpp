@@ -106,7 +106,8 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     return false;
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
-  if (massive && rigid_unit_ * rigid_.inertia.norm() < 1e-12 && (!solution.converged || slips_alone(problem, solution)))
+  if (massive && !lent_ && rigid_unit_ * rigid_.inertia.norm() < 1e-12 &&
+      (!solution.converged || slips_alone(problem, solution)))
     stick_at_one_point(problem, solution);
   if (solution.converged && options_.proximal > 0) polish(problem, solution);
   if (solution.converged && rigid_.count() > 0 && !massive) {

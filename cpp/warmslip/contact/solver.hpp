@@ -69,6 +69,7 @@ class ContactSolver {
   double stiff_proximal_ = 0;        // > 0: pressed points share their force on a stiff foundation as on a rigid one
   double spring_ = 0;                // > 0: force per velocity that holds a body without mass while nothing else does
   double lent_mass_ = 0;             // > 0: an inertia that draws the rigid motions to where they were, dimensionless
+  bool lent_ = false;                // whether its mass is lent by the solver of a body without mass
   bool carries_ = false;             // whether a point's own compliance includes the rigid motions
   double rigid_unit_ = 1;            // velocity per force, the unit of the rigid motions
   double compliance_norm_ = 0;       // largest row sum of |compliance|, a bound on its eigenvalues

@@ -61,7 +61,9 @@ bool ContactSolver<d>::newton_with_lent_mass(const ContactProblem<d>& problem, C
   for (int step = 0; step < 40; ++step, mass /= 4) {
     lent.inertia = mass / rigid_unit_ * Eigen::MatrixXd::Identity(m, m);
     heavy.rigid = problem.rigid + mass * solution.rigid;
-    ContactSolution<d> found = ContactSolver(compliance_, options_, lent).solve(heavy, total(problem, solution.added));
+    ContactSolver heavier(compliance_, options_, lent);
+    heavier.lent_ = true;
+    ContactSolution<d> found = heavier.solve(heavy, total(problem, solution.added));
     solution.iterations += found.iterations;
     solution.factorizations += found.factorizations;
     if (!found.converged) return false;

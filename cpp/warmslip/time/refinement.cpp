@@ -51,6 +51,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
   ContactSolution<d> change, again;
   correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
+  double crept = 0;  // what the contact leaves of motions that it stops, whether its response takes it away or not
   if (systems_->contact) {
     const Eigen::VectorXd velocity = sliding(next_.w);
     posed_.known_force = contact.force;
@@ -58,8 +59,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     posed_.rigid = rigid_load_;
     posed_.free = posed_.known_velocity + systems_->contact->compliance() * contact.force;
     again = contact;
-    if (!(apply ? solve_contact(contact.force, again)
-                : respond(correction + creep(contact) + rounding(velocity), again)))
+    const Eigen::VectorXd left = apply ? Eigen::VectorXd() : creep(contact);
+    crept = largest_entry(left);
+    if (!(apply ? solve_contact(contact.force, again) : respond(correction + left + rounding(velocity), again)))
       return false;
     if (apply) free_ = posed_.free;
     change = again;
@@ -83,7 +85,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     apply_contact_velocity(again, moved, correction_strained_);
     WARMSLIP_PETSC(VecWAXPY(correction_w_, -1, next_.w, moved));
   }
-  note(errors_.u, extents_.u, systems_->k * largest_entry(correction_w_),
+  note(errors_.u, extents_.u, systems_->k * std::max(largest_entry(correction_w_), crept),
        std::max(largest_entry(next_.u), largest_entry(now_.u)), balances.displacement_scale);
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
@@ -163,8 +165,9 @@ bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& 
   return found != 0;
 }
 
-// The slip of points that stick, (d points), of which the solver leaves some where their nodes are not points
-// themselves: it is little beside the motion that the contact stops, and may be much beside the straining that is left.
+// The slip of points that stick and the motion of points that press beyond the depth of their force, (d points). The
+// solver leaves some where nodes are not points themselves: it is little beside the motion that the contact stops, and
+// may be much beside the straining that is left.
 template <int d>
 Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   bool apart = false;
@@ -174,12 +177,21 @@ Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   Eigen::VectorXd out = sliding(next_.w);
   const double tolerated = options_.contact.tolerance * std::max(largest_entry(out), largest_entry(free_));
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const auto point = static_cast<std::size_t>(i);
+    const ContactLaw& law = posed_.law(point);
     const Point<d> nu = surface_.normals().row(i).transpose();
-    auto slip = out.template segment<d>(i * d);
-    const bool sticks = contact.status[static_cast<std::size_t>(i)] == Status::stick && !surface_.prescribed(i) &&
-                        posed_.law(static_cast<std::size_t>(i)).friction.regularisation == 0;
-    slip -= slip.dot(nu) * nu;
+    auto motion = out.template segment<d>(i * d);
+    const double across = motion.dot(nu), depth = posed_.points[point].penetration + systems_->k * across,
+                 pressure = contact.force.template segment<d>(i * d).dot(nu) / surface_.weights()[i];
+    Point<d> slip = motion - across * nu;
+    const bool sticks =
+        contact.status[point] == Status::stick && !surface_.prescribed(i) && law.friction.regularisation == 0;
     if (!sticks || slip.norm() > tolerated) slip.setZero();  // without a bound it sticks and slips as it likes
+    double beyond = pressure > 0 && !surface_.prescribed(i)
+                        ? (depth - law.compliance.penetration(pressure, depth)) / systems_->k
+                        : 0;
+    if (!(std::abs(beyond) <= tolerated)) beyond = 0;
+    motion = slip + beyond * nu;
   }
   return out;
 }
