@@ -55,9 +55,14 @@ def read(name: str) -> MeshFile:
 
 @lru_cache(maxsize=8)
 def _read(path: Path, name: str, _: int) -> MeshFile:
-    data = path.read_bytes()
+    data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     try:
-        raw = other_tools.parse(path) if path.suffix.lower() in other_tools.FORMATS else gmsh.parse(data)
+        suffix = path.suffix.lower()
+        if suffix not in (*other_tools.FORMATS, ".msh", "") and b"$MeshFormat" not in data:
+            raise ValueError(
+                f"files of the kind {suffix} are not read; save it as .msh, {', '.join(other_tools.FORMATS)}"
+            )
+        raw = other_tools.parse(path) if suffix in other_tools.FORMATS else gmsh.parse(data)
         return convert(raw, hashlib.sha256(data).hexdigest()[:16])
     except ValueError as error:
         raise ValueError(f"mesh file '{name}': {error}") from None

@@ -17,9 +17,9 @@ def texts(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def read(path: Path) -> list[Row]:
+def read(path: str | Path) -> list[Row]:
     """The rows of a table with numbers where they are numbers."""
-    return [{key: _value(text) for key, text in row.items()} for row in texts(path)]
+    return [{key: _value(text) for key, text in row.items()} for row in texts(Path(path))]
 
 
 def _value(text: str) -> Any:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from typing import Any, TypeVar, get_args, get_origin
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -86,8 +87,13 @@ def _allowed(where: list[str], root: type[BaseModel]) -> list[str]:
             free = False
             continue
         model = _table(fields[part].annotation) if part in fields else None
-        free = part in fields and get_origin(fields[part].annotation) is dict
+        free = part in fields and any(get_origin(one) is dict for one in _members(fields[part].annotation))
     return sorted(one.alias or name for name, one in getattr(model, "model_fields", {}).items())
+
+
+def _members(annotation: Any) -> tuple[Any, ...]:
+    """The types of a union, or the type itself."""
+    return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
 
 
 def _table(annotation: Any) -> Any:

@@ -178,7 +178,7 @@ def plan(scene: Scene) -> Plan:
         f"friction on '{c.part}' along the slip relative to its moving foundation" for c in touching if c.velocity
     ]
     steps += _heat_by_contact(touching)
-    fields += _partial_supports(scene)
+    fields += _supports(scene)
     return Plan(
         mesh=measures.lines(files.read(scene.mesh.file)) if scene.mesh.file is not None else [],
         fields=fields,
@@ -207,10 +207,11 @@ def _clock(scene: Scene) -> list[str]:
     ]
 
 
-def _partial_supports(scene: Scene) -> list[str]:
-    """What is held in some directions, and what is on springs."""
+def _supports(scene: Scene) -> list[str]:
+    """What is held, in all directions or in some, and what is on springs."""
     table, d = scene.supports, scene.mesh.dim
-    out = [f"'{part}' is held {held_along(table.moved[part], d)}" for part in table.guided]
+    out = [f"'{part}' is held in all directions" for part in table.clamped]
+    out += [f"'{part}' is held {held_along(table.moved[part], d)}" for part in table.guided]
     for point in table.points or []:
         place = ", ".join(f"{x:g}" for x in point.at)
         out.append(f"the node nearest to ({place}) is held {held_along(point.displacement or [0.0] * d, d)}")

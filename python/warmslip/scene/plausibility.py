@@ -131,6 +131,16 @@ def sunk(penetration: float, size: float, deformation: float) -> list[str]:
     return []
 
 
+def carried(moved: float, size: float) -> list[str]:
+    """Of the largest displacement of a body without inertia whose supports and foundation rest, and its size, lengths."""
+    if moved <= size:
+        return []
+    return [
+        f"the body moves by {moved:.3g}, {moved / size:.2g} times its size: hardly anything holds it; check its supports, "
+        "springs and loads"
+    ]
+
+
 def touched(most: int, points: int, nearest: float) -> list[str]:
     """Of how many contact points touch at most at any time, of how many there are, and how far the nearest is at the end."""
     if points == 0 or most >= POINTS:

@@ -92,13 +92,13 @@ class OutputTable(Table):
     checkpoint_minutes: Positive | None = None
     """Minutes between two checkpoints; whichever comes first."""
     probes: dict[str, ProbeTable] | None = None
-    """Points, lines and parts whose fields are written as CSV over time. A name is of letters, digits, - and _."""
+    """Points, lines and parts whose fields are written as CSV over time. A name is of letters a to z, digits, - and _."""
 
     @model_validator(mode="after")
     def _names(self) -> OutputTable:
         for name in self.probes or {}:
             if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
-                raise ValueError(f"probes: {quoted(name)} names no file; take letters, digits, - and _")
+                raise ValueError(f"probes: {quoted(name)} names no file; take letters a to z, digits, - and _")
         return self
 
 

@@ -17,7 +17,7 @@ from warmslip.model.discretisation import Discretisation
 from warmslip.model.foresight import TIMES, before, coupled_materials, size
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
-from warmslip.scene import plausibility
+from warmslip.scene import plausibility, plausible_data
 from warmslip.scene.scene import Scene
 from warmslip.simulation import growth
 from warmslip.simulation.pace import Step
@@ -47,6 +47,9 @@ class Monitor:
         self._scene, self._d, self._stepper, self._comm = scene, discretisation, stepper, comm
         self._law = any(contact.stiffness is not None for contact in scene.contacts)
         self._impacts = bool(self._law and scene.inertia is not None and scene.inertia.density > 0)
+        inertial = scene.inertia is not None and scene.inertia.density > 0
+        moving = plausible_data.acts([scene.supports.given, [contact.velocity for contact in scene.contacts]])
+        self._resting = scene.moves and not inertial and not moving
         self.seen: dict[str, Any] = {
             "touching": 0,
             "undetermined": 0,
@@ -212,6 +215,9 @@ class Monitor:
         self._temperatures()
         seen, heat = self.seen, self._scene.heat
         out = [*before(self._d), *self.fed(), *self._digits(statistics), *plausibility.strained(seen["strain"])]
+        if self._resting:
+            u = self._d.field(self._stepper.u)
+            out += plausibility.carried(float(np.linalg.norm(u, axis=1).max()), size(self._d))
         if self._law:
             out += self._contact(statistics.stages)
         nodes = len(self._d.mesh.nodes)
