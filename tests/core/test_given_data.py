@@ -216,3 +216,22 @@ def test_several_contact_parts_keep_their_laws() -> None:
     result = completed(scene)
     # 300 a = 1 + 100 (0.01 - a), the body being stiff
     assert -result.u[:, 0].mean() == pytest.approx((1 + 100 * 0.01) / 400, rel=1e-3)
+
+
+@pytest.mark.parametrize("steps", [5, 7, 10, 30])
+@pytest.mark.parametrize("inertia", [None, {"density": 1.0}])
+@pytest.mark.parametrize(
+    ("given", "after"), [("0.1 * (t <= 0.3)", 0.0), ("0.1 * (t > 0.3)", 0.1), ("0.1 * t * (t <= 0.6)", 0.0)]
+)
+def test_a_support_that_jumps_at_a_step_ends_where_it_is_given(
+    given: str, after: float, inertia: dict[str, float] | None, steps: int
+) -> None:
+    """Steps begin at the very time at which the step before them ended: 0.3 is not 0.4 - 0.1."""
+    held = {"bottom": [0.0, 0.0], "top": [0.0, given]}
+    for keys in ({}, {"time.tolerance": 0.5}):
+        result = completed(
+            column(1.0, supports={"displacement": held}, inertia=inertia, time={"end": 1.0, "steps": steps}).override(
+                **keys
+            )
+        )
+        assert result.u[-1, 1] == pytest.approx(after, abs=1e-14)

@@ -249,12 +249,12 @@ class Trajectory(Shown):
         """
         from mpi4py import MPI
 
-        found = discretise(self._scene(), comm=MPI.COMM_SELF)
+        found = discretise(self.built_scene(), comm=MPI.COMM_SELF)
         if not (np.array_equal(found.mesh.nodes, self.nodes) and np.array_equal(found.mesh.cells, self.cells)):
             raise ValueError(f"{self.path}: it was run on another mesh than its scene gives; read it through Python")
         return found
 
-    def _scene(self) -> Scene:
+    def built_scene(self) -> Scene:
         """The scene of the run. A mesh file that is gone or has changed is written anew from what the trajectory holds."""
         name, stored = self.scene["mesh"].get("file"), self._read.get("mesh/file")
         if name is None or stored is None:

@@ -28,8 +28,33 @@ def before(d: Discretisation) -> list[str]:
         *_gaps(d),
         *load_kinks(d),
         *_starts(d),
+        *_warm_corners(d),
         *_coupling(d),
     ]
+
+
+def _warm_corners(d: Discretisation) -> list[str]:
+    """Prescribed temperatures of two parts that differ where the parts meet, a pair of parts each."""
+    return list(d.remember("warm corners", lambda: [] if "loads" in d.user_functions else _contradictions(d)))
+
+
+def _contradictions(d: Discretisation) -> list[str]:
+    parts = list(d.scene.supports.temperature) if d.scene.heat is not None else []
+    found: dict[tuple[str, str], str] = {}
+    for t in np.linspace(0, d.scene.time.end, TIMES + 1) if len(parts) > 1 else ():
+        given = d.load_vectors.temperature(float(t))
+        size = max(float(np.abs(values).max(initial=0.0)) for _, values in given)
+        for i, (nodes, values) in enumerate(given):
+            for j, (others, other_values) in enumerate(given[:i]):
+                common, here, there = np.intersect1d(nodes, others, return_indices=True)
+                apart = np.abs(values[here] - other_values[there])
+                if len(common) and apart.max() > 1e-9 * size and (parts[j], parts[i]) not in found:
+                    k = int(apart.argmax())
+                    place = np.asarray(d.mesh.nodes)[common[k]]
+                    found[parts[j], parts[i]] = plausibility.warm_corner(
+                        parts[j], parts[i], float(other_values[there[k]]), float(values[here[k]]), place, float(t)
+                    )
+    return list(found.values())
 
 
 def _coupling(d: Discretisation) -> list[str]:

@@ -219,11 +219,11 @@ class LoadVectors:
             for part, nodes in self._cooled.items()
         ]
 
-    def _support_velocity(self, t: float, step: float) -> Any:
+    def _support_velocity(self, t: float, step: float, begin: float) -> Any:
         if self._velocity is None:
             return None
         values = np.zeros((len(self._nodes), self._dim))
-        values[self.supports.nodes] = (self.displacement(t) - self.displacement(t - step)) / step
+        values[self.supports.nodes] = (self.displacement(t) - self.displacement(begin)) / step
         self._layout.distribute(values.ravel(), self._velocity)
         return self._velocity
 
@@ -237,12 +237,14 @@ class LoadVectors:
         self._warmed = not any(map(of_time, self._loads.temperature.values()))
         return self._temperature
 
-    def at(self, t: float, step: float | None = None) -> StepData:
+    def at(self, t: float, step: float | None = None, begin: float | None = None) -> StepData:
         """The data of the step of size `step` (default: the scene's) that ends at time t, valid until the next call.
 
-        The vectors must not be changed.
+        `begin` is the time at which the step before it ended: t - step up to rounding, which decides where a support jumps. The
+        vectors must not be changed.
         """
         step = step or self._step
+        begin = t - step if begin is None else begin
         pair: list[Any] = list(self._constant)
         for i, present in enumerate(self._present):
             if present is not None:
@@ -251,7 +253,7 @@ class LoadVectors:
         for mechanical, rule, data, what in self._moving:
             self._add((pair[0], pair[1]), mechanical, rule, data, t, what)
         foundation = self.on_points("foundation_temperature", t) if self._reactive else np.empty(0)
-        velocity, temperature = self._support_velocity(t, step), self._support_temperature(t)
+        velocity, temperature = self._support_velocity(t, step, begin), self._support_temperature(t)
         drive = self.drive(t).ravel() if self._drives else np.empty(0)
         return StepData(pair[0], pair[1], self.on_points("gap", t), velocity, temperature, foundation, drive)
 

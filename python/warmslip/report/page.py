@@ -20,7 +20,6 @@ from warmslip.io import drawn
 from warmslip.io.paraview import opened
 from warmslip.io.trajectory import state_number
 from warmslip.scene import plan
-from warmslip.scene.reader import build
 
 FRAMES = 40
 
@@ -57,6 +56,7 @@ def view(
             found |= {"pressure": contacts.pressure(along), "stick_slip": contacts.stick_slip(along)}
         if len(t.series("steps")["time"]):
             found["history"] = drawings.history(t.series("steps")["time"], drawn.history(t, d))
+        solved = plan.text(plan.plan(t.built_scene()))  # while the mesh that the trajectory holds is there
         if (Path(run) / "error.csv").exists():
             found["error"] = error_bars([Path(run) / "error.csv"])
         files = []
@@ -73,12 +73,12 @@ def view(
             )
             files.append(folder / "animation.gif")
     page = folder / "report.html"
-    page.write_text(_page(Path(run), t.scene, functions, files), encoding="utf-8")
+    page.write_text(_page(Path(run), t.scene, solved, functions, files), encoding="utf-8")
     return [*files, page]
 
 
-def _page(run: Path, scene: dict[str, Any], functions: list[str], files: list[Path]) -> str:
-    """The report; a run that was killed has no summary."""
+def _page(run: Path, scene: dict[str, Any], solved: str, functions: list[str], files: list[Path]) -> str:
+    """The report, with what was `solved`; a run that was killed has no summary."""
     summary_file = run / "summary.json"
     summary = json.loads(summary_file.read_text(encoding="utf-8")) if summary_file.exists() else None
     images = [
@@ -97,6 +97,6 @@ def _page(run: Path, scene: dict[str, Any], functions: list[str], files: list[Pa
         functions=functions,
         summary=summary,
         images=images,
-        plan=plan.text(plan.plan(build(scene))),
+        plan=solved,
         toml=tomli_w.dumps(scene),
     )

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -129,6 +130,15 @@ def sunk(penetration: float, size: float, deformation: float) -> list[str]:
             f"foundation is the softer of the two; {cure}"
         ]
     return []
+
+
+def warm_corner(first: str, last: str, one: float, other: float, place: Sequence[float], t: float) -> str:
+    """Of two parts, in the order of the scene, that prescribe different temperatures at a common node."""
+    at = ", ".join(f"{x:.4g}" for x in place)
+    return (
+        f"'{first}' and '{last}' prescribe the temperatures {one:.4g} and {other:.4g} at their common node at ({at}), "
+        f"t = {t:.3g}: that of '{last}', the last one in the scene, is taken; blend the two near the corner if that matters"
+    )
 
 
 def carried(moved: float, size: float) -> list[str]:

@@ -18,12 +18,14 @@ SAFETY = 2.0  # an estimate is this far below the tolerance before steps grow
 
 
 class Step(NamedTuple):
-    """The step that is to be taken: its number from 1, its end and its size, times, and whether it is the last one."""
+    """The step that is to be taken: its number from 1, its end and its size, times, whether it is the last one, and the end of
+    the step before."""
 
     number: int
     time: float
     size: float
     last: bool
+    begin: float
 
 
 @dataclass
@@ -59,7 +61,7 @@ class FixedPace:
             return None
         n = self.taken + 1
         time, size = self._clock.step(n)
-        return Step(n, time, size, n == self._clock.steps)
+        return Step(n, time, size, n == self._clock.steps, self._clock.step(self.taken)[0] if self.taken else 0.0)
 
     def reached(self, time: float) -> bool:
         """Whether the last step that was taken ends at a time."""
@@ -124,7 +126,7 @@ class AdaptivePace:
         whole = self._steps * 2**FLOOR
         end = self.ticks + 2 ** (FLOOR - self.level)
         time = self._end if end == whole else self._end * (end / whole)
-        return Step(self.taken + 1, time, self.size(self.level), end == whole)
+        return Step(self.taken + 1, time, self.size(self.level), end == whole, self._end * (self.ticks / whole))
 
     def reached(self, time: float) -> bool:
         """Whether the last step that was taken ends at a time."""

@@ -24,7 +24,7 @@ from warmslip.model.probes import probes
 from warmslip.model.state import State
 from warmslip.records import provenance
 from warmslip.scene.scene import Scene
-from warmslip.simulation import checkpoint
+from warmslip.simulation import checkpoint, folder_lock
 from warmslip.simulation.signals import Interruption
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.summary import numbers, summary, trusted_digits
@@ -129,20 +129,34 @@ def run(
     folder = Path(out) if out is not None else None
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        _refuse_open(folder / "trajectory.h5", comm)
         if scene.initial.run is not None and Path(scene.initial.run).resolve() == (folder / "trajectory.h5").resolve():
             raise ValueError(f"initial.from: the run would overwrite '{scene.initial.run}'; choose another folder")
-        if not resume:
+    with folder_lock.held(folder, comm):
+        if folder is not None and not resume:
             _clear(folder, *checkpoint.NAMES, checkpoint.END)
-    simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)
-    rank, probing = simulation.comm.rank, probes(simulation.discretisation)
+        simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)
+        result, pressed = _taken(simulation, folder, observers, progress, resume)
+    if raises and pressed:
+        raise KeyboardInterrupt
+    return result
+
+
+def _taken(
+    simulation: Simulation,
+    folder: Path | None,
+    observers: Sequence[Observer],
+    progress: Callable[[int, int, Any], None] | None,
+    resume: bool,
+) -> tuple[Result, bool]:
+    """Takes all steps of a run, with its files; its result, and whether Ctrl-C ended it."""
+    rank, probing, output = simulation.comm.rank, probes(simulation.discretisation), simulation.scene.output
     path = folder / "trajectory.h5" if folder is not None else None
     begin = 0
     if resume and folder is not None:
         if ended := _ended(simulation, folder):
-            return ended
+            return ended, False
         begin = simulation.resume(folder)
-    minutes, saved = scene.output.checkpoint_minutes, time.monotonic()
+    minutes, saved = output.checkpoint_minutes, time.monotonic()
     with (
         Interruption() as stop,
         TrajectoryWriter(path, simulation.discretisation, simulation.stepper, simulation.comm, keep=begin) as writer,
@@ -157,7 +171,7 @@ def run(
             probe_writer.step(state)
             asked, late = stop.agreed(simulation.comm, minutes is not None and time.monotonic() - saved > 60 * minutes)
             last = simulation.finished
-            due = asked or late or simulation.taken % scene.output.checkpoint == 0
+            due = asked or late or simulation.taken % output.checkpoint == 0
             if folder is not None and (due or last):
                 writer.write()  # no checkpoint is ahead of its trajectory
                 probe_writer.write()
@@ -176,28 +190,7 @@ def run(
     if folder is not None and rank == 0 and simulation.outcome != "interrupted":
         for name in checkpoint.NAMES:  # the run is over; its last state lets it go on to a later end
             (folder / name).unlink(missing_ok=True)
-    if raises and stop.keyboard(simulation.comm):
-        raise KeyboardInterrupt
-    return result
-
-
-def _refuse_open(path: Path, comm: Any) -> None:
-    """Raises ValueError for a trajectory that another process writes (collective)."""
-    import fcntl
-
-    from mpi4py import MPI
-
-    comm, taken = MPI.COMM_WORLD if comm is None else comm, False
-    if comm.rank == 0 and path.exists():
-        with path.open("rb") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # as HDF5 does
-            except BlockingIOError:
-                taken = True
-            except OSError:
-                pass  # a file system without locks
-    if comm.bcast(taken, root=0):
-        raise ValueError(f"{path} is being written by another run; wait for its end, or choose another folder")
+    return result, stop.keyboard(simulation.comm)
 
 
 def _ended(simulation: Simulation, folder: Path) -> Result | None:

@@ -167,7 +167,7 @@ class Simulation(Shown):
         """The data of a step, for whose size the stepper is made ready; None where the run stops instead (collective)."""
         prescribed = self.discretisation.prescribed
         try:
-            loads = self.discretisation.load_vectors.at(step.time, step.size)
+            loads = self.discretisation.load_vectors.at(step.time, step.size, step.begin)
         except SupportsContradictError as error:  # on every rank
             return self._stop("supports_contradict", step.number, str(error))
         except ValueError as error:  # a formula that gives no finite number; on every rank

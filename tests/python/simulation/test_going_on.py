@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -149,9 +150,9 @@ def test_steps_begin_at_the_time_of_a_state_that_was_set() -> None:
     assert ends[-1] == 2.0
     assert len(ends) == 10
     assert np.abs(again.discretisation.field(again.stepper.u) - states[-1][0]).max() <= 1e-12
-    for time, first in ((0.5, 0.6), (0.0, 0.1)):  # also of a simulation that has stepped, back to an earlier time
-        state = states[round(10 * time) - 1] if time else (0 * states[0][0], 0 * states[0][1], 0 * states[0][2])
-        whole.discretisation.restart(whole.stepper, *state, time)
+    for at, first in ((0.5, 0.6), (0.0, 0.1)):  # also of a simulation that has stepped, back to an earlier time
+        state = states[round(10 * at) - 1] if at else (0 * states[0][0], 0 * states[0][1], 0 * states[0][2])
+        whole.discretisation.restart(whole.stepper, *state, at)
         ends = [one.time for one, _ in whole.steps()]
         assert ends[0] == pytest.approx(first)
         assert ends[-1] == 2.0
@@ -165,6 +166,7 @@ def test_steps_begin_at_the_time_of_a_state_that_was_set() -> None:
 def test_results_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trajectory is read, and its scene assembled, in another folder and without the mesh file."""
     from warmslip.mesh import files
+    from warmslip.report.page import view
 
     home, away = tmp_path / "home", tmp_path / "away"
     home.mkdir()
@@ -183,6 +185,7 @@ def test_results_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
         last = (None if one is None else one[-1] for one in (stored.u, stored.w, stored.theta))
         assert np.abs(d.mises_of(*last)).max() > 0
     assert result.completed
+    assert view(Path(), Path("view"))[-1].name == "report.html"
 
 
 def test_two_runs_in_one_folder(tmp_path: Path) -> None:
@@ -196,6 +199,31 @@ def test_two_runs_in_one_folder(tmp_path: Path) -> None:
     finally:
         holder.close()
     assert (tmp_path / "summary.json").read_bytes() == before
+    assert warmslip.run(scene(), out=tmp_path).completed
+
+
+def test_a_run_that_is_under_way_keeps_its_folder(tmp_path: Path) -> None:
+    """HDF5 locks no file that others may read while it is written: the run itself holds its folder, also if it is killed."""
+    program = f"""
+import warmslip
+keys = {{"mesh.n": 4, "time.steps": 100000, "output.every": 100, "output.checkpoint": 100}}
+scene = warmslip.load("paper_mixed").override(**keys)
+warmslip.run(scene, out={str(tmp_path)!r})
+"""
+    first = subprocess.Popen([sys.executable, "-c", program], env=child_environment())
+    try:
+        began = time.monotonic()
+        while not list(tmp_path.glob("checkpoint*")) and time.monotonic() - began < 60:
+            time.sleep(0.05)
+        for _ in range(2):
+            with pytest.raises(ValueError, match="is being written by another run; wait for its end"):
+                warmslip.run(scene(), out=tmp_path)
+        assert first.poll() is None
+    finally:
+        first.kill()
+        first.wait()
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        assert len(stored.time) >= 1
     assert warmslip.run(scene(), out=tmp_path).completed
 
 
