@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from copy import deepcopy
 from functools import lru_cache
 from typing import Any, Self
 
@@ -97,7 +98,8 @@ class Scene(Shown, SceneTables):
             mode="json", exclude_none=True, exclude_unset=True, by_alias=True
         )  # what was left open stays so
         for key, value in values.items():
-            replace(data, key, value.tolist() if hasattr(value, "tolist") else value)  # numbers and arrays of NumPy
+            # numbers and arrays of NumPy; a table that is given stays as it is when a later key goes into it
+            replace(data, key, value.tolist() if hasattr(value, "tolist") else deepcopy(value))
         return validated(data, type(self))
 
 

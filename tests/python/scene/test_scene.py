@@ -228,6 +228,15 @@ def test_the_paper_has_its_data() -> None:
         assert (s.time.coupling, s.contact.quadrature, s.mesh.diagonal) == ("staggered", "nodal", "right")
 
 
+def test_an_override_leaves_what_it_is_given(small: Callable[..., Scene]) -> None:
+    """A table among the values stays as it is when a later key goes into it."""
+    table = {"young": 3.0, "poisson": 0.2, "assumption": "plane_strain"}
+    given = dict(table)
+    scene = small().override(**{"elasticity": table, "elasticity.young": 5.0})
+    assert scene.elasticity is not None and scene.elasticity.young == 5.0
+    assert table == given
+
+
 def test_overrides(small: Callable[..., Scene]) -> None:
     s = load(
         "paper_mixed",

@@ -341,7 +341,7 @@ def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, warned: 
     for n in range(60):
         heat = 1.2**n
         balances = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
-        simulation.monitor._growth(balances, Step(n + 1, 0.1 * (n + 1), 0.1, last=False), [])
+        simulation.monitor._growth(balances, Step(n + 1, 0.1 * (n + 1), 0.1, last=False, begin=0.1 * n), [])
     assert bool(simulation.monitor.fed()) == warned
     share = simulation.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
     assert share == pytest.approx(0.0, abs=1e-12)
