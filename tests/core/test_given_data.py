@@ -235,3 +235,16 @@ def test_a_support_that_jumps_at_a_step_ends_where_it_is_given(
             )
         )
         assert result.u[-1, 1] == pytest.approx(after, abs=1e-14)
+
+
+def test_a_state_that_is_set_rests_where_supports_rest() -> None:
+    """Velocities of held directions are those of the supports, whatever the state says; the others are kept."""
+    held = {"bottom": [0.0, 0.0], "left": [0.0, "free"], "top": ["free", "0.1 * t"]}
+    scene = column(1.0, supports={"displacement": held}, inertia={"density": 1.0})
+    d = warmslip.discretise(scene)
+    x = np.asarray(d.mesh.nodes)
+    found = d.field(d.restart(d.stepper(), np.zeros_like(x), np.ones_like(x), None, 0.0).w)
+    assert np.array_equal(found[x[:, 1] == 0], np.zeros((3, 2)))
+    side = found[(x[:, 0] == 0) & (x[:, 1] > 0) & (x[:, 1] < 1)]
+    assert np.array_equal(side, np.tile([0.0, 1.0], (len(side), 1)))
+    assert np.array_equal(found[(x[:, 0] == 1) & (x[:, 1] == 0.5)], [[1.0, 1.0]])

@@ -24,7 +24,8 @@ Small = Callable[..., Scene]
 @pytest.fixture(name="result", scope="module")
 def _result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     folder = tmp_path_factory.mktemp("run")
-    scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 8, "output.every": 2})
+    keys = {"mesh.n": 4, "time.steps": 8, "output.every": 2, "loads.body": [0.0, "where(t < 0.4, 5, -40)"]}
+    scene = warmslip.load("paper_mixed").override(**keys)
     return warmslip.run(scene, out=folder)
 
 
@@ -42,10 +43,24 @@ def test_pressure_and_traction_with_its_bound(result: Result) -> None:
     for line, at in zip(drawn, seen, strict=True):
         assert np.array_equal(line.get_xdata(), at.arc_length) and np.array_equal(line.get_ydata(), at.pressure)
     values = [line.get_ydata() for line in lower.lines]
+    assert min(at.friction_bound.max() for at in seen) > 0
+    (one, other) = (shade.get_paths()[0].vertices for shade in lower.collections)
+    for shade, at in ((one, seen[0]), (other, seen[1])):
+        assert shade[:, 1].max() == at.friction_bound.max() and shade[:, 1].min() == -at.friction_bound.max()
     for at in seen:
         for wanted in (at.traction, at.friction_bound, -at.friction_bound):
             assert any(np.array_equal(one, wanted) for one in values)
     assert [text.get_text() for text in upper.get_legend().get_texts()] == ["t = 0.5", "t = 1"]
+
+
+def test_steps_that_touch_are_drawn_unless_times_are_given(result: Result) -> None:
+    """The body rises first: no curve is of that time."""
+    upper, _ = result.plot.contact()
+    with warmslip.Trajectory(str(result.trajectory)) as stored:
+        touching = [float(t) for t in np.arange(1, 9) / 8 if (stored.contact_on(time=float(t)).status > 0).any()]
+    assert 0 < len(touching) < 8
+    times = [float(text.get_text().removeprefix("t = ")) for text in upper.get_legend().get_texts()]
+    assert times and set(times) <= set(touching) and times[-1] == touching[-1]
 
 
 def test_the_map_shows_the_status_of_every_step(result: Result) -> None:
