@@ -142,8 +142,8 @@ def _explain(error: Exception) -> tuple[str, int]:
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         where = f" ({error.filename})" if error.filename else ""
         running = "run" in sys.argv[1:]
-        cure = "then go on from the last checkpoint with --resume" if running else "and give the command again"
-        return f"the disk is full{where}; make room{',' * running} {cure}", 1
+        cure = "and give the command again" + " with --resume" * running
+        return f"the disk is full{where}; make room {cure}", 1
     if isinstance(error, FileNotFoundError) and error.errno is None:  # of a reader, with the cure
         return str(error), 2
     if isinstance(error, OSError):

@@ -41,7 +41,7 @@ def test_a_full_disk_ends_in_a_sentence_and_can_be_gone_on_from(
     assert (
         full.stderr.split()
         == (
-            f"error: the disk is full ({small_disk / 'run'}); make room, then go on from the last checkpoint with --resume"
+            f"error: the disk is full ({small_disk / 'run'}); make room and give the command again with --resume"
         ).split()
     )
     readable(small_disk / "run" / "trajectory.h5")

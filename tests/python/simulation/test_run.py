@@ -15,8 +15,10 @@ import warmslip
 from warmslip import Loads, Scene, Trajectory, _core
 from warmslip.io.trajectory_writer import BALANCES
 from warmslip.model.discretisation import discretise
+from warmslip.scene.reader import build
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import worse
+from warmslip.simulation.summary import summary
 
 MakeScene = Callable[..., Scene]
 FIELDS = ("u", "w", "theta")
@@ -395,3 +397,32 @@ def test_a_body_at_rest_away_from_the_foundation_stays_there(small: MakeScene) -
     assert (result.outcome, result.summary["contact"]["open"]) == ("completed", 5)
     assert not result.u.any()
     assert not result.theta.any()
+
+
+def test_the_largest_pressure_on_a_curved_part_is_that_of_a_node() -> None:
+    """A node of a hole has a point for the normal of each of its facets, one of which may bear all of its force."""
+    scene = build(
+        {
+            "mesh": {"file": warmslip.load("plate_with_hole").mesh.file},
+            "time": {"steps": 2},
+            "elasticity": {"young": 100.0, "poisson": 0.3, "assumption": "plane_stress"},
+            "supports": {"displacement": {"top": [0.0, "0.05 * t"]}},
+            "contact": {
+                "part": "hole",
+                "stiffness": 1e4,
+                "gap": {"shape": "cylinder", "at": [1.0, 0.55], "radius": 0.24},
+            },
+        }
+    )
+    simulation = Simulation(scene)
+    list(simulation.steps())
+    surface = simulation.discretisation.surface
+    force, places = np.reshape(simulation.stepper.contact_force, (-1, 2)), np.asarray(surface.positions)
+    weights = np.asarray(surface.weights)
+    single = np.linalg.norm(force, axis=1) / weights
+    at = np.abs(places - places[single.argmax()]).max(axis=1) < 1e-12
+    assert at.sum() == 2
+    mean = np.linalg.norm(force[at].sum(axis=0)) / weights[at].sum()
+    stated = summary(simulation)["largest"]["pressure"]
+    assert stated == pytest.approx(mean, rel=0.05)
+    assert single.max() > 1.9 * stated
