@@ -40,3 +40,6 @@ Tensor = Annotated[Matrix | float, BeforeValidator(_number_or_matrix)]
 
 class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a scene does not change; scene.override with '{name}' among its keys makes another one")

@@ -228,6 +228,14 @@ def test_the_paper_has_its_data() -> None:
         assert (s.time.coupling, s.contact.quadrature, s.mesh.diagonal) == ("staggered", "nodal", "right")
 
 
+def test_a_scene_does_not_change(small: Callable[..., Scene]) -> None:
+    scene = small()
+    for table, name in ((scene, "title"), (scene.mesh, "n")):
+        with pytest.raises(AttributeError, match=f"a scene does not change; scene.override with '{name}'"):
+            setattr(table, name, 3)
+    assert scene.mesh.n == 4
+
+
 def test_an_override_leaves_what_it_is_given(small: Callable[..., Scene]) -> None:
     """A table among the values stays as it is when a later key goes into it."""
     table = {"young": 3.0, "poisson": 0.2, "assumption": "plane_strain"}
