@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from warmslip.figures.style import BLUE, GREY, INK, SKY, VERMILLION, number
+from warmslip.typing import Array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 STATUS = (("open", "#d9d9d9"), ("stick", SKY), ("slip", VERMILLION))
 ARC_LENGTH = "arc length along '{}' (length)"
 

@@ -17,8 +17,8 @@ from matplotlib.patches import Rectangle
 
 from warmslip.figures.style import GREY, INK, PALE, SKY, VERMILLION, number
 from warmslip.scene.full import FullScene, build_full
+from warmslip.typing import Array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 STATUS = (("open", "white"), ("stick", SKY), ("slip", VERMILLION))
 
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILLION, column, number
 from warmslip.records import tables
+from warmslip.typing import Array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 PLACE = ("step", "time", "length", "x", "y", "z")
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, INK)
 TIMES = 5  # profiles of a line

@@ -18,8 +18,8 @@ from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, number
+from warmslip.typing import Array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 MAPS = {"displacement": cm.imola, "von Mises stress": cm.batlow, "temperature": cm.lipari}
 STATUS = (("open", GREY), ("stick", SKY), ("slip", VERMILLION))  # the same in every figure of a run
 COLOURS_OF_STATUS = "grey, blue, orange"

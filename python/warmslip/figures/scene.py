@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from warmslip.figures.run import Array, creases, directions, outline
+from warmslip.figures.run import creases, directions, outline
 from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, SKY, VERMILLION
+from warmslip.typing import Array
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY, INK)
 ARROW = 0.15  # length of the largest traction, over the size of the body

@@ -9,12 +9,13 @@ import numpy as np
 
 from warmslip.figures import run as drawings
 from warmslip.figures.contact import ContactLine
-from warmslip.figures.run import Array, Body
+from warmslip.figures.run import Body
 from warmslip.io.paraview import contact_at
 from warmslip.io.part_series import columns
 from warmslip.io.trajectory import Trajectory
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.state import resultants
+from warmslip.typing import Array
 
 ENERGIES = ("kinetic", "elastic", "contact")
 LOSSES = ("viscous", "friction")

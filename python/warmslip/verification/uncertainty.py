@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from warmslip.records import tables
 from warmslip.records.check import Check
-
-Array = NDArray[np.float64]
+from warmslip.typing import Array
 
 
 @dataclass(frozen=True)
