@@ -31,6 +31,17 @@ MAX_COMPRESSION = 1000  # bytes from a byte of a file that somebody compressed
 LATER = {"foundation_work"}  # terms that files of earlier versions lack
 
 
+def _opened(path: Path) -> h5py.File:
+    """A file for reading, without a lock, or a run could not close what somebody reads. Raises OSError."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
+        try:
+            return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
+        except OSError:  # a run that has just ended took it away
+            return h5py.File(path, "r", locking=False)
+
+
 def _check(file: h5py.File) -> None:
     """Raises ValueError with what is missing or misshapen. A run that was killed may have more rows of one than of another."""
     nodes, d = _shape(file, "mesh/nodes", "f", None, None)
@@ -105,10 +116,7 @@ class Trajectory(Shown):
             cure = f"give '{inside}'" if inside.is_file() else THE_FILE
             raise FileNotFoundError(f"'{path}' is no file; {cure}")
         try:
-            try:
-                self._file = h5py.File(self.path, "r", locking=False)  # or a run could not close what somebody reads
-            except OSError:  # a run that was killed, or is still going on, leaves its writer's mark
-                self._file = h5py.File(self.path, "r", libver="latest", swmr=True, locking=False)
+            self._file = _opened(self.path)
         except OSError as error:
             if error.errno is not None:  # of the system: rights, a disk
                 raise

@@ -227,6 +227,21 @@ warmslip.run(scene, out={str(tmp_path)!r})
     assert warmslip.run(scene(), out=tmp_path).completed
 
 
+def test_a_run_may_end_while_its_trajectory_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is being written opens in one way only, and a moment later only in the other."""
+    warmslip.run(scene(), out=tmp_path)
+    opened, ways = h5py.File, iter([OSError("unable to open file"), OSError("not already open for SWMR writing"), None])
+
+    def late(*arguments: Any, **keys: Any) -> Any:
+        if error := next(ways):
+            raise error
+        return opened(*arguments, **keys)
+
+    monkeypatch.setattr("warmslip.io.trajectory.h5py.File", late)
+    with warmslip.Trajectory(tmp_path / "trajectory.h5") as stored:
+        assert stored.time[-1] == 0.5
+
+
 LOOP = """
 import os, signal, sys, warmslip
 scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 8})
