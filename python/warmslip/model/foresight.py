@@ -95,6 +95,17 @@ def _gaps(d: Discretisation) -> list[str]:
     return out
 
 
+def meeting(d: Discretisation, t: float) -> Any:
+    """Whether the normal of a contact point meets the foundation at time t, (points,)."""
+    of_part, places = np.asarray(d.surface.contacts, dtype=int), np.asarray(d.surface.positions)
+    out = np.ones(len(of_part), dtype=bool)
+    for i in np.unique(of_part):
+        gap = d.load_vectors.on_contact("gap", int(i))
+        if isinstance(gap, ShapeGap):
+            out[of_part == i] = gap.meets(places[of_part == i], t)
+    return out
+
+
 def _starts(d: Discretisation) -> list[str]:
     """Jumps between the initial temperature and that of supports and foundations."""
     scene = d.scene

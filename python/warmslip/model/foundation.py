@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,14 @@ class ShapeGap:
         return self.table.of_time
 
     def __call__(self, x: Array, t: float) -> Array:
+        return self._along_normals(x, t)[0]
+
+    def meets(self, x: Array, t: float) -> Any:
+        """Whether the normals of the points meet the shape, (points,)."""
+        return self._along_normals(x, t)[1]
+
+    def _along_normals(self, x: Array, t: float) -> tuple[Array, Any]:
+        """The gap, and whether the normals meet the shape."""
         d = x.shape[1]
         away = evaluate(data(self.table.at), x, t, d, "contact.gap.at") - x
         if self.table.shape == "plane":
@@ -60,7 +69,7 @@ def _across(vectors: Array, axis: Array) -> Array:
     return vectors - np.outer(vectors @ axis, axis)
 
 
-def _to_half_spaces(away: Array, normals: Array, sides: list[Array]) -> Array:
+def _to_half_spaces(away: Array, normals: Array, sides: list[Array]) -> tuple[Array, Any]:
     """Along normals (points, d) to what half-spaces have in common; `sides` are their outward unit normals at the place that
     `away` leads to."""
     enter, leave = np.full(len(away), -np.inf), np.full(len(away), np.inf)
@@ -72,10 +81,10 @@ def _to_half_spaces(away: Array, normals: Array, sides: list[Array]) -> Array:
         enter = np.where(inwards, np.maximum(enter, at), enter)
         leave = np.where(crosses & (rises > 0), np.minimum(leave, at), leave)
     meets = np.isfinite(enter) & (enter <= leave) & (leave >= 0)
-    return np.where(meets, enter, _beside(away))
+    return np.where(meets, enter, _beside(away)), meets
 
 
-def _to_ball(away: Array, directions: Array, radius: float) -> Array:
+def _to_ball(away: Array, directions: Array, radius: float) -> tuple[Array, Any]:
     """Along directions (points, d), of a length of at most 1, to a circle or sphere about the points that `away` leads to."""
     length2 = np.maximum((directions**2).sum(axis=1), 1e-300)
     middle = (away * directions).sum(axis=1) / length2  # where the ray comes nearest to the centre
@@ -83,7 +92,7 @@ def _to_ball(away: Array, directions: Array, radius: float) -> Array:
     half2 = (radius**2 - past2) / length2
     half = np.sqrt(np.maximum(half2, 0))
     meets = (half2 >= 0) & (middle + half >= 0)
-    return np.where(meets, middle - half, _beside(away) + radius)
+    return np.where(meets, middle - half, _beside(away) + radius), meets
 
 
 def _beside(away: Array) -> Array:

@@ -152,9 +152,12 @@ def carried(moved: float, size: float) -> list[str]:
 
 
 def touched(most: int, points: int, nearest: float) -> list[str]:
-    """Of how many contact points touch at most at any time, of how many there are, and how far the nearest is at the end."""
+    """Of how many contact points touch at most at any time, of how many there are, and how far the nearest is at the end,
+    infinity where the normals of all miss the foundation."""
     if points == 0 or most >= POINTS:
         return []
+    if most == 0 and nearest == np.inf:
+        return ["nothing ever touches: no normal of the part meets the foundation; check contact.gap"]
     if most == 0:
         return [
             f"nothing ever touches: the nearest point ends {nearest:.3g} away; lower contact.gap, or load the body towards it"

@@ -14,7 +14,7 @@ import numpy as np
 
 from warmslip.model import several_solutions
 from warmslip.model.discretisation import Discretisation
-from warmslip.model.foresight import TIMES, before, coupled_materials, size
+from warmslip.model.foresight import TIMES, before, coupled_materials, meeting, size
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
 from warmslip.scene import plausibility, plausible_data
@@ -241,9 +241,8 @@ class Monitor:
         inwards = np.sum(moved * normals, axis=1)
         deformation = float(np.linalg.norm(u - u.mean(axis=0), axis=1).max())
         out = plausibility.sunk(seen["penetration"], size(d), deformation)
-        out += plausibility.touched(
-            seen["touching"], len(weights), float((gap - inwards).min()) if len(weights) else 0.0
-        )
+        ahead = (gap - inwards)[meeting(d, float(stepper.time))]
+        out += plausibility.touched(seen["touching"], len(weights), float(ahead.min()) if len(ahead) else np.inf)
         touching, of_part = np.asarray(stepper.status) > 0, np.asarray(d.surface.contacts, dtype=int)
         slip = np.linalg.norm(moved - inwards[:, None] * normals, axis=1)
         for i in np.unique(of_part):

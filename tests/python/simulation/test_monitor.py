@@ -155,6 +155,14 @@ AFTER = [
         "the body sinks into the foundation by 0.02",
     ),
     (body(PRESSED, contact__gap=0.1), "nothing ever touches: the nearest point ends 0.095 away"),
+    (
+        body(PRESSED, contact__gap={"shape": "cylinder", "at": [5.0, -0.5], "radius": 0.2}),
+        "nothing ever touches: no normal of the part meets the foundation",
+    ),
+    (
+        body(PRESSED, contact__gap={"shape": "cylinder", "at": [0.5, -1.5], "radius": 1.4}),
+        "nothing ever touches: the nearest point ends 0.095 away",
+    ),
     (body(PRESSED, contact__gap="10 * abs(x - 0.5)"), "at most 1 of 9 contact points ever touch"),
     (
         body(
