@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from warmslip._core import Outcome
+from warmslip.io.trajectory import Trajectory
 from warmslip.messages import Shown, quoted
 from warmslip.model.contact_laws import Law
 from warmslip.model.discretisation import Discretisation, discretise
@@ -19,6 +20,7 @@ from warmslip.model.loads import Loads
 from warmslip.model.state import State
 from warmslip.model.supports import SupportsContradictError
 from warmslip.records import provenance
+from warmslip.scene.overrides import differing
 from warmslip.scene.scene import Scene
 from warmslip.simulation import checkpoint, pace, ranks
 from warmslip.simulation.checkpoint import Checkpoint
@@ -263,6 +265,16 @@ class Simulation(Shown):
         if self.local_error is not None:
             self.local_error.restore(state.pace, arrays)
 
+    def _changed(self, folder: Path) -> str:
+        """The keys that differ from the scene of the run in a folder, as the end of a sentence."""
+        try:
+            with Trajectory(folder / "trajectory.h5") as stored:
+                before, now = stored.scene, self.scene.resolved()
+        except (OSError, ValueError):
+            return ""
+        keys = [key for key in differing(before, now) if not key.startswith(("output", "title"))]
+        return f"; {', '.join(keys[:4])} differ{'s' * (len(keys) == 1)}" if keys else ""
+
     def resume(self, folder: Path) -> int:
         """Goes on from the newest whole checkpoint in `folder`; the step it goes on from, 0 if there is none (collective).
 
@@ -275,7 +287,7 @@ class Simulation(Shown):
             try:
                 found = checkpoint.read(folder, start, self.scene.digest())
             except ValueError as error:
-                refusal = str(error)
+                refusal = str(error) + self._changed(folder)
         found, refusal = self.comm.bcast((found, refusal), root=0)
         if refusal:
             raise ValueError(refusal)
