@@ -65,8 +65,14 @@ def _sentence(error: Any, where: list[str], model: type[BaseModel]) -> str:
             return message if key == "scene" else f"{key}: {message}"
         case "model_type":
             return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where, model))}"
+        case "list_type" if isinstance(error.get("input"), dict):
+            return f"{key} is a list of tables; write [[{key}]] once for each, or a list"
         case "list_type":
-            return f"{key} = {given} is no list; write [{given}]"
+            return f"{key} = {given} is no list; write [{given}], with as many entries as it needs"
+        case "too_short":
+            return f"{key} = {given} has too few entries; give at least {error['ctx']['min_length']}"
+        case "too_long":
+            return f"{key} = {given} has too many entries; give at most {error['ctx']['max_length']}"
         case "string_pattern_mismatch" if key.endswith("quadrature"):
             return f"{key} = {given} is unknown; use nodal, or gauss-1 to gauss-8"
         case "literal_error" if key.endswith("stiffness"):

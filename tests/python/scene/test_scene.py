@@ -228,6 +228,31 @@ def test_the_paper_has_its_data() -> None:
         assert (s.time.coupling, s.contact.quadrature, s.mesh.diagonal) == ("staggered", "nodal", "right")
 
 
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ({"contact.velocity": [0.1]}, r"contact.velocity = \[0.1\] has too few entries; give at least 2$"),
+        ({"loads.body": [0.0] * 4}, r"loads.body = .* has too many entries; give at most 3$"),
+        (
+            {"contact.velocity": 0.1},
+            r"contact.velocity = 0.1 is no list; write \[0.1\], with as many entries as it needs",
+        ),
+        (
+            {"supports.points": {"0": {"at": [0.0, 0.0]}}},
+            r"supports.points is a list of tables; write \[\[supports.points\]\]",
+        ),
+        ({"supports.springs": {"left": {"stifness": 1.0}}}, "did you mean 'stiffness'"),
+        (
+            {"supports.springs": {"left": {"k": 1.0}}},
+            "the keys here are damping, normal_damping, normal_stiffness, stiffness",
+        ),
+    ],
+)
+def test_lists_and_free_names(small: Callable[..., Scene], tables: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        small().override(**tables)
+
+
 def test_a_scene_does_not_change(small: Callable[..., Scene]) -> None:
     scene = small()
     for table, name in ((scene, "title"), (scene.mesh, "n")):
