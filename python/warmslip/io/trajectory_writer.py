@@ -87,7 +87,14 @@ class TrajectoryWriter:
         elif not earlier.exists():  # else a resumed run was killed while it copied
             os.replace(path, earlier)
         self._ballast = Ballast(path.parent)
-        file = self._file = h5py.File(path, "w", libver="latest")
+        try:
+            file = self._file = h5py.File(path, "w", libver="latest")
+        except OSError as error:
+            if "already open" not in str(error):
+                raise
+            raise ValueError(
+                f"{path} is open in this program; close its Trajectory, or choose another folder"
+            ) from None
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
         file.attrs["digest"] = discretisation.scene.digest()
         file.attrs["functions"] = json.dumps(discretisation.user_functions)

@@ -242,6 +242,16 @@ def test_a_run_may_end_while_its_trajectory_is_opened(tmp_path: Path, monkeypatc
         assert stored.time[-1] == 0.5
 
 
+def test_a_trajectory_that_is_open_here_is_not_replaced(tmp_path: Path) -> None:
+    warmslip.run(scene(), out=tmp_path)
+    with (
+        warmslip.Trajectory(tmp_path / "trajectory.h5") as stored,
+        pytest.raises(ValueError, match=r"trajectory.h5 is open in this program; close its Trajectory"),
+    ):
+        warmslip.run(scene(), out=tmp_path)
+    assert stored is not None and warmslip.run(scene(), out=tmp_path).completed
+
+
 LOOP = """
 import os, signal, sys, warmslip
 scene = warmslip.load("paper_mixed").override(**{"mesh.n": 4, "time.steps": 8})
