@@ -9,5 +9,7 @@ cmake --preset release >/dev/null
 cmake --build --preset release
 ctest --preset release
 (($#)) && exec python -m pytest "$@"
-python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile -m "not mpi"
-python -m pytest -m mpi
+status=0
+python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile -m "not mpi" || status=1
+python -m pytest -m mpi || status=1
+exit "$status"

@@ -293,6 +293,18 @@ def weak_and_stiff_springs(d: int) -> None:
             assert simulation.report.normal_force == pytest.approx(0.01, rel=share)
             ends.append(field(simulation, "u") @ axes)
         assert np.abs(ends[1] - ends[0]).max() <= 1e-7 * np.abs(ends[0]).max(), spring
+    penalty = pressed(
+        d,
+        {},
+        n=4 if d == 2 else 3,
+        elasticity=elasticity(d, 1.0, 0.3),
+        supports={"springs": {side: {"normal_stiffness": 1e7} for side in sides}},
+        loads={"body": along(d, -0.01, 0.003)},
+        contact=contact,
+    )
+    one, mesh = turned(penalty, turn)
+    simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
+    assert len(list(simulation.steps())) == 4, simulation.failure
 
 
 @check

@@ -145,3 +145,31 @@ TEST_CASE("the block: norms on any number of ranks") {
   check_near(Paper<3>(3, 1, 2).run(4, Coupling::lagged),
              {0.068562728902031, 0.0358658061665048, 0.404470693603612, 0.498397879463677});
 }
+
+TEST_CASE_TEMPLATE("a body that leaves its supports is out of balance", D, Two, Three) {
+  constexpr int d = D::value;
+  const Paper<d> paper(2);
+  BalanceEvaluator<d> evaluator(paper.layout, paper.problem, paper.operators, paper.surface);
+  const auto still = [&](int block) {
+    VecHandle v = paper.layout.vector(block);
+    WARMSLIP_PETSC(VecSet(v, 0));
+    return v;
+  };
+  TimeLevel before, after;
+  for (TimeLevel* level : {&before, &after}) {
+    for (VecHandle* v : {&level->u, &level->w, &level->momentum, &level->elastic_u, &level->expansion_theta})
+      *v = still(d);
+    for (VecHandle* v : {&level->theta, &level->mass_theta, &level->heating_w}) *v = still(1);
+    level->contact_u = level->contact_force = Eigen::VectorXd::Zero(paper.surface.points() * d);
+    level->gap = Eigen::VectorXd::Ones(paper.surface.points());
+    WARMSLIP_PETSC(VecSet(level->w, 1));  // as a whole: no inner force, and the same momentum
+    level->sizes = {0, 1, 1, 0};
+  }
+  const VecHandle load = still(d), supply = still(1), carried = still(d);
+  WARMSLIP_PETSC(VecSet(carried, 1));
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(paper.surface.points() * d);
+  StepInputs inputs{0.1, load, supply, before.expansion_theta, before.heating_w, 0, 1, none, none, {}, none, carried};
+  CHECK(evaluator.evaluate(before, after, inputs).force_residual <= 1e-14);
+  inputs.support_velocity = nullptr;  // supports at rest, which the body leaves
+  CHECK(evaluator.evaluate(before, after, inputs).force_residual == doctest::Approx(1));
+}

@@ -6,7 +6,6 @@ import errno
 import logging
 import os
 import re
-import signal
 import sys
 from importlib import metadata
 from typing import Annotated, Any
@@ -93,11 +92,7 @@ def main() -> None:
         )  # else typer draws a box around what is wrong with a call
         if code == 130:  # typer's word for Ctrl-C
             _say("interrupted; files that were written are kept", everywhere=False)
-        sys.stdout.flush()
         sys.exit(code if isinstance(code, int) else 0)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is flushed at exit
-        sys.exit(128 + signal.SIGPIPE)
     except SceneError as error:  # every rank reads the same scene and refuses it alike
         _say(str(error), everywhere=False)
         if not ranks.others_come():  # they have read another scene

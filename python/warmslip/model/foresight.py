@@ -39,8 +39,9 @@ def _warm_corners(d: Discretisation) -> list[str]:
 
 
 def _contradictions(d: Discretisation) -> list[str]:
+    """A sentence for each pair, at the time and the node where the two are furthest apart."""
     parts = list(d.scene.supports.temperature) if d.scene.heat is not None else []
-    found: dict[tuple[str, str], str] = {}
+    worst: dict[tuple[str, str], tuple[float, str]] = {}
     for t in np.linspace(0, d.scene.time.end, TIMES + 1) if len(parts) > 1 else ():
         given = d.load_vectors.temperature(float(t))
         size = max(float(np.abs(values).max(initial=0.0)) for _, values in given)
@@ -48,13 +49,13 @@ def _contradictions(d: Discretisation) -> list[str]:
             for j, (others, other_values) in enumerate(given[:i]):
                 common, here, there = np.intersect1d(nodes, others, return_indices=True)
                 apart = np.abs(values[here] - other_values[there])
-                if len(common) and apart.max() > 1e-9 * size and (parts[j], parts[i]) not in found:
+                pair = parts[j], parts[i]
+                if len(common) and apart.max() > max(1e-9 * size, worst.get(pair, (0.0, ""))[0]):
                     k = int(apart.argmax())
+                    both = float(other_values[there[k]]), float(values[here[k]])
                     place = np.asarray(d.mesh.nodes)[common[k]]
-                    found[parts[j], parts[i]] = plausibility.warm_corner(
-                        parts[j], parts[i], float(other_values[there[k]]), float(values[here[k]]), place, float(t)
-                    )
-    return list(found.values())
+                    worst[pair] = float(apart[k]), plausibility.warm_corner(*pair, *both, place, float(t))
+    return [text for _, text in worst.values()]
 
 
 def _coupling(d: Discretisation) -> list[str]:

@@ -184,8 +184,11 @@ def largest_values(d: Discretisation, stepper: Any) -> dict[str, float]:
 
 
 def _mean_pressure(surface: Any, force: Array) -> Array:
-    """The contact pressure, of points at one place their mean. A node of a curved part has a point for the normal of each of its
-    facets, and how they share its pressure is a matter of the mesh; at an edge (20 degrees and more) they stay apart."""
+    """The contact pressure of every point, (points,), stress; of points at one place their mean. `force` is (points, d).
+
+    A node of a curved part has a point for the normal of each of its facets, and how they share its pressure is a matter of the
+    mesh. At an edge (20 degrees and more) they stay apart.
+    """
     normals, weights = np.asarray(surface.normals), np.asarray(surface.weights)
     pressing = np.sum(force * normals, axis=1)
     places = np.column_stack([np.asarray(surface.contacts, dtype=float), np.asarray(surface.positions)])

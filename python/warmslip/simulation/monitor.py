@@ -46,8 +46,8 @@ class Monitor:
     def __init__(self, scene: Scene, discretisation: Discretisation, stepper: Any, comm: Any) -> None:
         self._scene, self._d, self._stepper, self._comm = scene, discretisation, stepper, comm
         self._law = any(contact.stiffness is not None for contact in scene.contacts)
-        self._impacts = bool(self._law and scene.inertia is not None and scene.inertia.density > 0)
         inertial = scene.inertia is not None and scene.inertia.density > 0
+        self._impacts = self._law and inertial
         moving = plausible_data.acts([scene.supports.given, [contact.velocity for contact in scene.contacts]])
         self._resting = scene.moves and not inertial and not moving
         self.seen: dict[str, Any] = {

@@ -135,20 +135,20 @@ def run(
         if folder is not None and not resume:
             _clear(folder, *checkpoint.NAMES, checkpoint.END)
         simulation = Simulation(scene, comm=comm, loads=loads, laws=laws, backend=backend)
-        result, pressed = _taken(simulation, folder, observers, progress, resume)
+        result, pressed = _carried_out(simulation, folder, observers, progress, resume)
     if raises and pressed:
         raise KeyboardInterrupt
     return result
 
 
-def _taken(
+def _carried_out(
     simulation: Simulation,
     folder: Path | None,
     observers: Sequence[Observer],
     progress: Callable[[int, int, Any], None] | None,
     resume: bool,
 ) -> tuple[Result, bool]:
-    """Takes all steps of a run, with its files; its result, and whether Ctrl-C ended it."""
+    """Takes all steps and writes the files; the result of the run, and whether Ctrl-C ended it (collective)."""
     rank, probing, output = simulation.comm.rank, probes(simulation.discretisation), simulation.scene.output
     path = folder / "trajectory.h5" if folder is not None else None
     begin = 0

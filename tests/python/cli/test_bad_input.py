@@ -95,6 +95,36 @@ def test_one_sentence_and_exit_code_2(arguments: list[str], words: str, command:
     assert words in done.stderr
 
 
+@pytest.mark.parametrize("words", ["list", "explain paper_mixed", "run heat_slab --set time.steps=2 --out run"])
+def test_a_reader_that_has_seen_enough_ends_a_command(words: str, tmp_path: Path) -> None:
+    """Into a pipe that nobody reads: no traceback, no banner, exit code 1, and the files of a run."""
+    program = Path(sys.executable).parent / "warmslip"
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [program, *words.split()],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        env=child_environment(),
+        text=True,
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert (tmp_path / "run/summary.json").exists() == words.startswith("run")
+
+
+def test_meshes_of_other_kinds_and_with_a_byte_order_mark(tmp_path: Path) -> None:
+    scene = warmslip.load("plate_with_hole")
+    for suffix in (".vtk", ".stl"):
+        (tmp_path / f"body{suffix}").write_bytes(b"# vtk DataFile Version 2.0")
+        with pytest.raises(ValueError, match=rf"files of the kind \{suffix} are not read; save it as .msh, .vtu, .inp"):
+            scene.override(**{"mesh.file": str(tmp_path / f"body{suffix}")})
+    (tmp_path / "marked.msh").write_bytes(codecs.BOM_UTF8 + MESH.read_bytes())
+    marked = warmslip.discretise(scene.override(**{"mesh.file": str(tmp_path / "marked.msh")}))
+    assert len(marked.mesh.nodes) == len(warmslip.discretise(scene).mesh.nodes)
+
+
 def test_figures_are_png_files() -> None:
     from matplotlib.figure import Figure
 

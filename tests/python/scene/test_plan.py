@@ -115,6 +115,24 @@ def test_the_command_says_what_it_costs(command: Command) -> None:
     assert "cost here" not in command("explain", "heat_slab", "--no-trial").stdout
 
 
+def test_a_plan_lists_what_is_held() -> None:
+    """In all directions, in some, at points and on springs."""
+    scene = warmslip.load("quasistatic_punch").override(
+        supports={
+            "displacement": {"top": ["0.01 * t", 0.0], "left": [0.0, "free"]},
+            "points": [{"at": [1.0, 0.5], "displacement": ["free", 0.0]}],
+            "springs": {"right": {"stiffness": 1.0}},
+        }
+    )
+    held = [line for line in plan.plan(scene).fields if "held" in line or "springs" in line]
+    assert held == [
+        "'top' is held in all directions",
+        "'left' is held along x",
+        "the node nearest to (1, 0.5) is held along y",
+        "'right' is on springs or dashpots",
+    ]
+
+
 def test_what_a_plan_counts_and_warns_of() -> None:
     found = cost.measured(warmslip.load("two_materials"))
     assert any(line.startswith("region 'insert': ") and line.endswith("of 512 cells") for line in found.fields)

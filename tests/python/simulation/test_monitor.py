@@ -53,6 +53,11 @@ BEFORE = [  # scene, what is said before and after the run; None: nothing
         "nothing acts: there is no",
     ),
     (body(PRESSED, supports__displacement={"top": ["free", "-0.005 * t"], "left": [0.0, "free"]}), None),
+    (
+        body(WARM, supports={"temperature": {"left": 20.0, "top": "20 + 5 * t"}}),
+        "'left' and 'top' prescribe the temperatures 20 and 20.5 at their common node at (0, 1), t = 0.1: that of 'top'",
+    ),
+    (body(WARM, supports={"temperature": {"left": 20.0, "right": "20 + 5 * t"}}), None),
     (body(TURNED), None),
     (body(WARM, contact__heat_exchange__foundation_temperature=20.0), "nothing acts: there is no load"),
     (body(WARM, contact__heat_exchange__foundation_temperature=21.0), None),
@@ -155,6 +160,16 @@ AFTER = [
         "the body sinks into the foundation by 0.02",
     ),
     (body(PRESSED, contact__gap=0.1), "nothing ever touches: the nearest point ends 0.095 away"),
+    (
+        body(
+            PRESSED,
+            contact=None,
+            supports__displacement={"left": [0.0, "free"]},
+            supports__springs={"top": {"stiffness": 1e-3}},
+            loads={"body": [0.0, -1.0]},
+        ),
+        "the body moves by 1e+03, 1e+03 times its size: hardly anything holds it",
+    ),
     (
         body(PRESSED, contact__gap={"shape": "cylinder", "at": [5.0, -0.5], "radius": 0.2}),
         "nothing ever touches: no normal of the part meets the foundation",
