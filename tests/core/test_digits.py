@@ -197,6 +197,30 @@ def friction_heat_of_a_light_touch(d: int) -> None:
     assert abs(stated["theta"] - stated["contact_force"]) < 1
 
 
+@check
+def heat_that_an_insulated_body_keeps(d: int) -> None:
+    """Conduction beside which the capacity of a long step is nothing neither makes heat nor loses any, however many steps."""
+    source = 0.01
+    for coupling in ("staggered", "lagged", "monolithic"):
+        simulation = Simulation(
+            scene(
+                d,
+                3 if d == 2 else 2,
+                time={"end": 200.0, "steps": 200, "coupling": coupling},
+                elasticity=elasticity(d, 1.0, 0.3),
+                heat={"conductivity": 1e10, "capacity": 1.0, "source": source, "expansion": {"tensor": 1e-3}},
+                initial={"temperature": 10.0},
+                supports={"displacement": ["bottom"]},
+            )
+        )
+        for _ in simulation.steps():
+            pass
+        assert simulation.outcome == "completed", simulation.failure
+        digits = summary(simulation)["digits"]
+        error = np.abs(field(simulation, "theta") / (10.0 + 200.0 * source) - 1).max()
+        assert error <= 1e-10 and min(digits["theta"], digits["u"]) > 9, (coupling, error, digits)
+
+
 def cooling(d: int, coupling: str, steps: int = 3, push: str = "0", **contact: Any) -> Simulation:
     """A steel block rests by its weight on a foundation that cools it, without inertia: it shrinks over all points."""
     simulation = Simulation(

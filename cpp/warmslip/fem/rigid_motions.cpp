@@ -183,12 +183,20 @@ void RigidMotions::prepare(Factor& factor, const Apply& mass) {
   respond([&](Vec r, Vec x) { factor.solve(r, x); }, mass, inner_, along_);
   if (!factor.symmetric())
     respond([&](Vec r, Vec x) { factor.solve_transposed(r, x); }, mass, inner_transposed_, along_transposed_);
+  weigh(along_, mass);
+}
+
+void RigidMotions::prepare(const Apply& mass) { weigh(motions_, mass); }
+
+// H from W, or from the motions themselves.
+void RigidMotions::weigh(const std::vector<VecHandle>& along, const Apply& mass) {
   inertia_.resize(count(), count());
+  if (empty()) return;
   const VecHandle right = duplicate(motions_.front());
   for (Eigen::Index j = 0; j < count(); ++j) {
     WARMSLIP_PETSC(VecSet(right, 0));
     mass(motions_[static_cast<std::size_t>(j)], right);
-    inertia_.row(j) = dots(along_, right).transpose();
+    inertia_.row(j) = dots(along, right).transpose();
   }
 }
 

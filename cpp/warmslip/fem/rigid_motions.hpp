@@ -53,6 +53,8 @@ class RigidMotions {
   void add_springs(Mat k);
   /// V, W and H for a factored K~ and the mass M', which acts on vectors of the motion's unknowns.
   void prepare(Factor& factor, const Apply& mass);
+  /// H = Z^T M' Z alone, of motions that the operator holds.
+  void prepare(const Apply& mass);
 
   /// Z^T b_ext - V^T b (collective); b_ext has the motion's unknowns alone.
   Eigen::VectorXd load(Vec external, Vec all) const;
@@ -64,6 +66,8 @@ class RigidMotions {
   void strain(const Eigen::VectorXd& motions, Vec inner) const;
   /// x -= the motion that is nearest to it, in the sum of squares over the nodes; its components.
   Eigen::VectorXd remove(Vec x) const;
+  /// Z^T b (collective)
+  Eigen::VectorXd of(Vec b) const { return dots(motions_, b); }
   /// x += Z a
   void carry(const Eigen::VectorXd& motions, Vec x) const;
 
@@ -80,6 +84,7 @@ class RigidMotions {
   using Solve = std::function<void(Vec, Vec)>;
   Eigen::VectorXd dots(const std::vector<VecHandle>& with, Vec x) const;
   void combine(const std::vector<VecHandle>& of, const Eigen::VectorXd& by, Vec x) const;
+  void weigh(const std::vector<VecHandle>& along, const Apply& mass);
   void respond(const Solve& solve, const Apply& mass, std::vector<VecHandle>& inner, std::vector<VecHandle>& along);
 
   VecHandle right_;                                             // a vector of the operator

@@ -44,8 +44,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   evaluator_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
   if (!apply) evaluator_.add_rounding(momentum_right_, momentum_external_);
   if (monolithic) {
-    evaluator_.heat_defect(now_, next_, inputs, heat_right_);
-    if (!apply) evaluator_.add_rounding(heat_right_, nullptr);
+    coupled_heat_defect(inputs, !apply);
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
@@ -116,6 +115,33 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     }
   }
   return true;
+}
+
+// The defect of the heat equation of a monolithic step, in heat_right_. Conduction warms no part as a whole: what its
+// rounding would is taken off, as the capacity of a long step may be far smaller.
+template <int d>
+void Stepper<d>::coupled_heat_defect(const StepInputs& inputs, bool with_rounding) {
+  evaluator_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  if (with_rounding) evaluator_.add_rounding(heat_right_, heat_external_);
+  if (systems_->constants.empty()) return;
+  WARMSLIP_PETSC(VecAXPY(heat_right_, -1, heat_external_));
+  systems_->constants.remove(heat_right_);
+  WARMSLIP_PETSC(VecAXPY(heat_right_, 1, heat_external_));
+}
+
+// The balances of a solved step. The temperature of every part of a monolithic one that conducts far more than it
+// stores is first shifted by a constant, so that the part has all of its heat.
+template <int d>
+Balances Stepper<d>::weigh(const StepLoads& loads, const ContactSolution<d>& contact) {
+  const StepInputs inputs = complete(loads, contact);
+  const Balances balances = balance(inputs);
+  if (!monolithic() || systems_->constants.empty()) return balances;
+  evaluator_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
+  const Eigen::VectorXd missing = systems_->constants.alone(systems_->constants.of(heat_external_));
+  if (!(missing.cwiseAbs().maxCoeff() > 1e-15 * next_.sizes.theta)) return balances;
+  systems_->constants.carry(missing, next_.theta);
+  products(next_);
+  return balance(this->inputs(loads, contact));
 }
 
 template <int d>
@@ -247,7 +273,7 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   double warmer = Errors::unknown;
   const bool creeps = systems_->contact && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
   if (creeps && correct_motion(loads, balances, contact, true)) {
-    balances = balance(complete(loads, contact));
+    balances = weigh(loads, contact);
     ++cost_.refinements;
     errors_ = {};
     for (Extent* field : extents_.all()) field->tried = 0;
@@ -257,12 +283,12 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
     const Motion before = motion_of(contact);
     const bool was_closed = closed(balances);
     if (!correct_motion(loads, balances, contact, true)) break;
-    balances = balance(complete(loads, contact));
+    balances = weigh(loads, contact);
     ++cost_.refinements;
     refined = true;
     if (was_closed && !closed(balances)) {  // it did harm
       undo(before, contact);
-      balances = balance(complete(loads, contact));
+      balances = weigh(loads, contact);
       break;
     }
     if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;

@@ -66,7 +66,20 @@ StepSystems<d>::StepSystems(const Layout<d>& layout, const Problem<d>& problem, 
     : k(size) {
   if (!(k > 0) || !std::isfinite(k)) throw std::invalid_argument("the time step must be positive and finite");
   const bool moves = problem.moves(), conducts = problem.conducts();
+  // a capacity and an exchange that hold the constant temperature beside the conduction need no help
+  if (conducts && largest_diagonal(operators.mass) / k + largest_diagonal(operators.exchange) <
+                      0.1 * largest_diagonal(operators.conductivity))
+    constants = RigidMotions(
+        layout, 1, 1, nodes_of(problem, problem.prescribed_temperature), parts_in_contact(problem, false),
+        at_nodes(problem, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
+  const auto holds = [&](Vec x, Vec y) {  // the capacity and the exchange
+    if (operators.exchange) WARMSLIP_PETSC(MatMult(operators.exchange, x, y));
+    const VecHandle stored = duplicate(y);
+    WARMSLIP_PETSC(MatMult(operators.mass, x, stored));
+    WARMSLIP_PETSC(VecAXPY(y, 1 / k, stored));
+  };
   if (coupling == Coupling::monolithic && moves && conducts) {
+    if (!constants.empty()) constants.prepare(holds);
     if (problem.contact_heats())
       throw std::invalid_argument("heat that the contact makes or conducts needs the staggered or the lagged coupling");
     auto [scale, symmetry] = coupled_symmetry(problem);
@@ -80,23 +93,11 @@ StepSystems<d>::StepSystems(const Layout<d>& layout, const Problem<d>& problem, 
     }
     if (conducts) {
       const MatHandle h = heat_matrix(operators, k);
-      // a capacity and an exchange that hold the constant temperature beside the conduction need no help
-      const double storing = largest_diagonal(operators.mass) / k + largest_diagonal(operators.exchange);
-      if (storing < 0.1 * largest_diagonal(operators.conductivity))
-        constants = RigidMotions(
-            layout, 1, 1, nodes_of(problem, problem.prescribed_temperature), parts_in_contact(problem, false),
-            at_nodes(problem, [](const Material<d>& m) { return m.conductivity ? m.conductivity->norm() : 0; }));
       if (!constants.empty()) constants.add_springs(h);
       const auto apart = problem.contact_heats() ? surface.global_nodes() : std::vector<PetscInt>{};
       heat = factor(h, apart, problem.conducts_symmetrically() ? Symmetry::positive_definite : Symmetry::general, 1,
                     "heat", backend);
-      if (!constants.empty())
-        constants.prepare(*heat, [&](Vec x, Vec y) {
-          if (operators.exchange) WARMSLIP_PETSC(MatMult(operators.exchange, x, y));
-          const VecHandle stored = duplicate(y);
-          WARMSLIP_PETSC(MatMult(operators.mass, x, stored));
-          WARMSLIP_PETSC(VecAXPY(y, 1 / k, stored));
-        });
+      if (!constants.empty()) constants.prepare(*heat, holds);
     }
   }
   if (surface.points() == 0) return;

@@ -31,9 +31,10 @@ def worse(one: float, other: float) -> float:
 
 
 def digits(errors: dict[str, float]) -> dict[str, float]:
-    """Decimal digits that estimated relative errors leave to be trusted, 16 at most, by field."""
+    """Decimal digits that estimated relative errors leave to be trusted, 16 at most, by field; rounded down to a tenth."""
     return {
-        name: round(min(16.0, max(0.0, -math.log10(value))), 1) if value > 0 else 16.0 for name, value in errors.items()
+        name: math.floor(10 * min(16.0, max(0.0, -math.log10(value)))) / 10 if value > 0 else 16.0
+        for name, value in errors.items()
     }
 
 

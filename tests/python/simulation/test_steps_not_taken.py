@@ -15,7 +15,7 @@ import warmslip
 from warmslip import Loads, Scene, Trajectory, _core
 from warmslip.model.discretisation import discretise
 from warmslip.simulation.simulation import Simulation
-from warmslip.simulation.statistics import worse
+from warmslip.simulation.statistics import digits, worse
 
 MakeScene = Callable[..., Scene]
 FIELDS = ("u", "w", "theta")
@@ -154,6 +154,16 @@ def test_a_body_that_moves_far_for_its_strain(small: MakeScene, speed: float) ->
     assert result.completed and result.summary["digits"]["stress"] > (5 if speed > 1 else 10)
     moved = np.array([speed, 0.0])
     assert np.abs(result.w - still.w - moved).max() <= 2e-14 * speed
+
+
+def test_digits_are_rounded_down() -> None:
+    """A field with fewer than four digits is never reported to have four."""
+    assert digits({"u": 1.05e-4, "theta": 1e-4, "stress": 0.0, "contact_force": 2.0}) == {
+        "u": 3.9,
+        "theta": 4.0,
+        "stress": 16.0,
+        "contact_force": 0.0,
+    }
 
 
 def test_a_foundation_out_of_reach_costs_no_digits(small: MakeScene) -> None:
