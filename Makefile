@@ -41,7 +41,7 @@ bench: setup  ## the benchmarks alone (ARGS go to pytest)
 mutants: setup  ## seeded faults against the tests: which check kills which (ARGS: names, --handful N, --every, --out FILE)
 	@$(env) python tests/mutants/run.py $(ARGS)
 
-extremes: setup  ## scenes all over the space of data, each judged in 80 digits (ARGS: --families, --count N, --jobs N, --scene laws:50)
+extremes: setup  ## scenes all over the space of data, each judged in 80 digits (ARGS: --families, --count N, --jobs N, --seed N, --scene laws:50)
 	@$(env) python tests/campaign/run.py $(ARGS)
 
 envelope: setup  ## how far each datum of five scenes can be moved (ARGS: --scenes, --axes, --jobs N)

@@ -3,6 +3,7 @@
     make extremes                                        all of it, about ten minutes
     make extremes ARGS="--families supported free --count 64"
     make extremes ARGS="--scene laws:50"                 one scene: its file and what the judge says
+    make extremes ARGS="--seed 1 --out other"            another campaign: scenes that nobody has seen
 
 campaign.csv has a line a scene, campaign_summary.csv one a family, campaign.png shows them; scenes that are not right go to
 a folder of scene files if one is named (`--keep`).
@@ -88,10 +89,10 @@ def write(path: Path, lines: list[dict[str, Any]]) -> None:
         table.writerows({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in line.items()} for line in lines)
 
 
-def one(name: str) -> int:
+def one(name: str, seed: int = sampling.SEED) -> int:
     """The scene FAMILY:NUMBER and its judgement."""
     family, _, number = name.partition(":")
-    (job,) = sampling.sample(family, int(number) + 1)[int(number) :]
+    (job,) = sampling.sample(family, int(number) + 1, seed)[int(number) :]
     print(tomli_w.dumps(job.tables))
     for key, value in work(job, lambda _: None).items():
         print(f"# {key}: {value}")
@@ -106,10 +107,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/extremes"))
     parser.add_argument("--keep", type=Path, help="folder for the scene files of what is not right")
     parser.add_argument("--scene", help="one scene instead, FAMILY:NUMBER")
+    parser.add_argument("--seed", type=int, default=sampling.SEED, help="of the scrambled sequences")
     given = parser.parse_args(arguments)
     if given.scene:
-        return one(given.scene)
-    scenes = [s for family in given.families for s in sampling.sample(family, given.count or sampling.FAMILIES[family])]
+        return one(given.scene, given.seed)
+    counts = {family: given.count or sampling.FAMILIES[family] for family in given.families}
+    scenes = [s for family, count in counts.items() for s in sampling.sample(family, count, given.seed)]
     by_name = {(s.family, s.number): s for s in scenes}
     lines: list[dict[str, Any]] = []
     began = time.monotonic()
@@ -131,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
     from warmslip.records import provenance
 
     stamp = provenance.stamp(
-        seed=sampling.SEED, scenes={f: sum(line["family"] == f for line in lines) for f in given.families}
+        seed=given.seed, scenes={f: sum(line["family"] == f for line in lines) for f in given.families}
     )
     (given.out / "campaign.json").write_text(json.dumps(stamp, indent=2) + "\n")
     figures.draw("campaign", [given.out / "campaign.csv"], given.out / "campaign.png")

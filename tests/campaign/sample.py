@@ -40,17 +40,16 @@ class Sampled:
         return build(self.tables)
 
 
-def points(family: str, count: int) -> Any:
-    """The first `count` points of a family, (count, axes) in [0, 1)."""
-    sobol = qmc.Sobol(len(AXES), scramble=True, seed=SEED + list(FAMILIES).index(family))
+def points(family: str, count: int, seed: int = SEED) -> Any:
+    """The first `count` points of a family, (count, axes) in [0, 1); another seed scrambles the sequence anew."""
+    sobol = qmc.Sobol(len(AXES), scramble=True, seed=seed + list(FAMILIES).index(family))
     return sobol.random_base2(max(0, math.ceil(math.log2(max(count, 1)))))[:count]
 
 
-def sample(family: str, count: int) -> list[Sampled]:
-    """The first `count` scenes of a family."""
-    return [
-        _scene(family, i, dict(zip(AXES, map(float, row), strict=True))) for i, row in enumerate(points(family, count))
-    ]
+def sample(family: str, count: int, seed: int = SEED) -> list[Sampled]:
+    """The first `count` scenes of a family; another seed gives other scenes."""
+    rows = enumerate(points(family, count, seed))
+    return [_scene(family, i, dict(zip(AXES, map(float, row), strict=True))) for i, row in rows]
 
 
 def three(value: float) -> float:
