@@ -56,7 +56,7 @@ void bind(py::module_& m) {
           "Sets the state; None for a field the problem does not have.")
       .def(
           "resume",
-          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 13>& given,
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 16>& given,
              int taken) {
             std::vector<Status> statuses;
             for (const int one : status) statuses.push_back(static_cast<Status>(one));
@@ -64,7 +64,8 @@ void bind(py::module_& m) {
             auto value = given.begin();
             for (Extent* field : extents.all())
               for (double Extent::*part : extent_parts) field->*part = *value++;
-            extents.force = *value;
+            extents.force = *value++;
+            for (double& along : extents.motion) along = *value++;
             s.resume(force, statuses, extents, taken);
           },
           py::arg("contact_force"), py::arg("status"), py::arg("extents"), py::arg("taken"),
@@ -75,15 +76,17 @@ void bind(py::module_& m) {
           "extents",
           [](const S& s) {
             FieldExtents extents = s.extents();
-            std::array<double, 13> out{};
+            std::array<double, 16> out{};
             auto value = out.begin();
             for (const Extent* field : extents.all())
               for (double Extent::*part : extent_parts) *value++ = field->*part;
-            *value = extents.force;
+            *value++ = extents.force;
+            for (const double along : extents.motion) *value++ = along;
             return out;
           },
           "Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may "
-          "make of it, and the largest estimated change; last the largest nodal force.")
+          "make of it, and the largest estimated change; then the largest nodal force and the largest displacements of "
+          "contact points, by axis.")
       .def("part", &S::part, py::arg("strained"), py::arg("strained_w"), py::arg("rigid"),
            "After `start`: displacement and velocity of a body without supports but for rigid motions, and the "
            "velocities of those.")

@@ -22,9 +22,10 @@ double distance(const NormalCompliance& law, double pressure, double r) {
 }  // namespace
 
 template <int d>
-double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity) {
-  double largest = 0, max_speed = 0, max_bound = 0;
-  Point<d> motion = Point<d>::Zero();  // the largest terms of the displacements, component by component
+double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& force, const Eigen::VectorXd& velocity,
+                    const Point<d>& least) {
+  double largest = 0, max_speed = least.norm() / problem.step, max_bound = 0;
+  Point<d> motion = least;  // the largest terms of the displacements, component by component
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
     if (point.prescribed) continue;
@@ -79,7 +80,9 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
   return worst;
 }
 
-template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
-template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&);
+template double law_residual<2>(const ContactProblem<2>&, const Eigen::VectorXd&, const Eigen::VectorXd&,
+                                const Point<2>&);
+template double law_residual<3>(const ContactProblem<3>&, const Eigen::VectorXd&, const Eigen::VectorXd&,
+                                const Point<3>&);
 
 }  // namespace warmslip

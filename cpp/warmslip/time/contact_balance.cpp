@@ -109,9 +109,10 @@ void BalanceEvaluator<d>::contact(const TimeLevel& before, const TimeLevel& afte
     // and of that along the velocity, which is what the contact leaves of the free one
     work_magnitude_ += std::max(in.contact_force.template segment<d>(i * d).norm(), bound) * in.k *
                        (w.norm() + in.contact_free.template segment<d>(i * d).norm());
+    work_magnitude_ += bound * in.least_motion.norm();
   }
   l.contact_change = l.contact - stored_before;
-  l.law_residual = law_residual(problem, in.contact_force, w_points);
+  l.law_residual = law_residual<d>(problem, in.contact_force, w_points, in.least_motion.template head<d>());
   Eigen::VectorXd nodal(surface_.nodes() * d);
   Eigen::Map<RealTable<d>>(nodal.data(), surface_.nodes(), d) =
       shape_.transpose() * Eigen::Map<const RealTable<d>>(in.contact_force.data(), surface_.points(), d);

@@ -202,6 +202,7 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           free_,
           loads.foundation,
           drive_,
+          1e-5 * extents_.motion,
           loads.support_velocity};
 }
 
@@ -297,6 +298,8 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balan
     Extent& forces = extents_.contact_force;
     forces.size = std::max(forces.size, contact.force.template lpNorm<Eigen::Infinity>());
     forces.scale = std::max(forces.scale, forces.size);
+    const auto motions = next_.contact_u.reshaped(d, surface_.points()).cwiseAbs().rowwise().maxCoeff();
+    extents_.motion.head(d) = extents_.motion.head(d).cwiseMax(motions);
   }
   report.stage = contact.stage;
   report.newton_iterations = contact.iterations;

@@ -56,7 +56,8 @@ struct Extent {
 };
 struct FieldExtents {
   Extent u, theta, stress, contact_force;
-  double force = 0;  ///< the largest nodal force so far
+  double force = 0;                                  ///< the largest nodal force so far
+  Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< the largest displacement of a contact point so far, by axis
 
   std::array<Extent*, 4> all() { return {&u, &theta, &stress, &contact_force}; }
 };
