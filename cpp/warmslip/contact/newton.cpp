@@ -17,7 +17,7 @@ Eigen::Matrix<double, d, Eigen::Dynamic, Eigen::ColMajor, d, d> sought(const Poi
   return across;
 }
 
-constexpr int patience = 15;  // steps in which a small correction may change statuses
+constexpr int patience = 15;  // steps in which a small correction may change statuses, or small forces settle
 
 // Eigen's estimate alone is any number where a pivot is 0 exactly.
 bool singular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
@@ -232,9 +232,11 @@ template <int d>
 bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
   Linearisation at = linearise(problem, solution.added, solution.rigid);
   const Eigen::Index all = compliance_.rows();
-  ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
-  double best_rest = 0;     // what its forces leave of their own equations
-  std::vector<int> tried;   // statuses of the step before
+  ContactSolution<d> best;    // the tolerance is met: one step more may reach round-off
+  double best_rest = 0;       // what its forces leave of their own equations
+  bool best_settled = false;  // whether that is little beside them
+  int best_step = 0;
+  std::vector<int> tried;  // statuses of the step before
   for (int step = 0;; ++step) {
     solution.velocity = at.velocity;
     solution.force = total(problem, solution.added);
@@ -257,10 +259,12 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
       if (!best.converged || solution.law_residual < best.law_residual || nearer) {
         best = solution;
         best_rest = rest;
+        best_settled = settled;
+        best_step = step;
       }
       best.converged = true;
       if (!helped || (settled && solution.law_residual <= 1e-2 * options_.tolerance)) break;
-    } else if (best.converged) {
+    } else if (best.converged && (best_settled || step >= best_step + patience)) {
       break;
     }
     if (step >= options_.newton_steps) {

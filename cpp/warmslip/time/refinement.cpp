@@ -222,13 +222,15 @@ Eigen::VectorXd Stepper<d>::creep(const ContactSolution<d>& contact) const {
   return out;
 }
 
-// What rounding does to the velocities of the points along their normals, (d points), to one side and the other in
-// turn: a body that slides fast along an oblique foundation is pressed into it by rounding.
+// What rounding of velocities and displacements does to the velocities of the points along their normals, (d points),
+// to one side and the other in turn: a body that slides fast along an oblique foundation is pressed into it by
+// rounding, and one that has just come to it in very short steps.
 template <int d>
 Eigen::VectorXd Stepper<d>::rounding(const Eigen::VectorXd& velocity) const {
+  const Eigen::VectorXd sizes = velocity.cwiseAbs() + now_.contact_u.cwiseAbs() / systems_->k;
   Eigen::VectorXd out(velocity.size());
   for (Eigen::Index i = 0; i < surface_.points(); ++i) {
-    const Point<d> nu = surface_.normals().row(i).transpose(), size = velocity.segment<d>(i * d).cwiseAbs();
+    const Point<d> nu = surface_.normals().row(i).transpose(), size = sizes.segment<d>(i * d);
     out.segment<d>(i * d) = (i % 2 ? 1 : -1) * std::numeric_limits<double>::epsilon() * size.dot(nu.cwiseAbs()) * nu;
   }
   return out;
