@@ -6,7 +6,7 @@
     stopped_though_solvable    a named outcome, although doubles can hold the answer
     ill_posed_and_said         a named outcome, and one unit in the last place of the data moves the answer, or the rounding of
                                displacements the stress
-    ill_posed_unsaid           ended right, not within 1e-6, but nearer than the data are known
+    ill_posed_unsaid           ended right, not within 1e-6 nor within the digits, but nearer than the data are known
     refused                    before it started, with a reason
     crash, hang                neither
     unjudged                   the reference found no solution
@@ -297,7 +297,7 @@ def judge(scene: Scene, ran: Ran) -> dict[str, Any]:
     else:
         near = all(errors[name] <= max(TOLERANCE, DATA * spread[name]) for name in FIELDS)
         message = all(errors[name] <= stated(ran, name) for name in FIELDS)
-        row["class"] = "ill_posed_unsaid" if near else "right_as_stated" if message else "silently_wrong"
+        row["class"] = "right_as_stated" if message else "ill_posed_unsaid" if near else "silently_wrong"
     left = [it.scheme.left_over(a, b, n) for n, (a, b) in enumerate(itertools.pairwise(own), 1)]
     row |= {f"left_{name}": max((one[name] for one in left), default="") for name in LEFT}
     row |= {f"error_{name}": errors[name] for name in FIELDS} | {f"spread_{name}": v for name, v in spread.items()}

@@ -97,6 +97,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
       move();
       return newton(problem, true, solution);
     });
+  attempt(Stage::restart, [&] { return kept_coefficients(problem, solution); });
   attempt(Stage::tresca_fixed_point, [&] {
     const Trial trial(*this);
     const bool unsupported = solution.unsupported;
@@ -117,6 +118,52 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   solution.unsupported = solution.unsupported && !solution.converged;
   solution.rigid *= rigid_unit_;
   return solution;
+}
+
+// Where friction falls with the slip speed: the coefficients of the slip so far are kept, which is a problem of
+// Coulomb's, and Newton's method goes on from its solution.
+template <int d>
+bool ContactSolver<d>::kept_coefficients(const ContactProblem<d>& problem, ContactSolution<d>& solution) {
+  ContactProblem<d> kept = problem;
+  kept.laws.clear();
+  bool falls = false;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    kept.points[i].law = i;
+    kept.laws.push_back(problem.law(i));
+    falls = falls || (problem.law(i).friction.speed > 0 && !problem.law(i).friction.custom);
+    kept.laws[i].friction.speed = 0;
+  }
+  if (!falls) return false;
+  ContactSolution<d> found = solution;
+  bool converged = false;
+  for (int pass = 0; pass < 50 && !converged; ++pass) {
+    clear_cache();
+    found = solve(kept, total(problem, found.added));
+    solution.iterations += found.iterations;
+    solution.factorizations += found.factorizations;
+    if (!found.converged) break;
+    found.rigid /= rigid_unit_;
+    clear_cache();
+    ContactSolution<d> finished = found;
+    converged = newton(problem, true, finished);
+    solution.iterations += finished.iterations - found.iterations;
+    if (converged) {
+      finished.iterations = solution.iterations;
+      finished.factorizations = solution.factorizations;
+      finished.stage = solution.stage;
+      solution = std::move(finished);
+    }
+    for (std::size_t i = 0; i < problem.points.size(); ++i) {
+      const Friction& falling = problem.law(i).friction;
+      const Point<d>&nu = problem.points[i].normal,
+            w = found.velocity.template segment<d>(static_cast<Eigen::Index>(i) * d);
+      double& coefficient = kept.laws[i].friction.coefficient;
+      if (falling.speed > 0 && !falling.custom)
+        coefficient += (pass < 10 ? 1 : 0.5) * (falling.at((w - w.dot(nu) * nu).norm()) - coefficient);
+    }
+  }
+  clear_cache();
+  return converged;
 }
 
 #define WARMSLIP_INSTANTIATE(d)                                                             \

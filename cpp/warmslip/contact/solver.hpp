@@ -51,6 +51,7 @@ class ContactSolver {
   bool convex(const ContactProblem<d>& problem, const Eigen::VectorXd& centre, double firmness,
               ContactSolution<d>& solution);
   bool is_supported(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  bool kept_coefficients(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool tresca_fixed_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool enumerate(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   void polish(const ContactProblem<d>& problem, ContactSolution<d>& solution);

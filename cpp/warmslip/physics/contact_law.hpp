@@ -72,6 +72,10 @@ struct Friction {
   std::function<std::array<double, 3>(double, double)> custom{};
 
   FrictionBound bound(double pressure, double slip_speed) const;
+  /// mu at a slip speed.
+  double at(double slip_speed) const {
+    return speed > 0 ? kinetic + (coefficient - kinetic) * std::exp(-slip_speed / speed) : coefficient;
+  }
   /// Whether a traction may be borne at all.
   bool present() const { return custom || coefficient > 0 || cohesion > 0; }
   /// Whether the bound is a constant multiple of the pressure, or a constant.
