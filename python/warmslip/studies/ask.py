@@ -18,7 +18,7 @@ from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import QUANTITIES, Distance, march
 from warmslip.studies.error_estimate import orders, richardson
 from warmslip.studies.error_norms import TERMS
-from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, Setting, describe
+from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, Setting, describe, together
 
 SAFETY = 1.15  # what is aimed at lies so far below what is asked for
 ROUND_OFF = 1e-10  # relative errors below it are not promised
@@ -202,19 +202,19 @@ def solve(
         setting = choice.setting
         say(f"running {describe(choice)}")
         half = max(1, setting.cells - 1) if pilots.file else setting.cells // 2
-        settings = [
-            setting,
-            replace(setting, cells=half),
-            replace(setting, cells=half, count=setting.count // 2),
-        ]
-        runs = [pilots.companion(one) for one in settings]
-        (space, time), size = march(runs, [(0, 1), (1, 2)], progress)
+        halved = bool(pilots.file) or pilots.gradable(setting.mesh, half)
+        coarse = replace(setting, cells=half) if halved else setting
+        slower = replace(coarse, count=setting.count // 2)
+        runs = [pilots.companion(one) for one in ([setting, coarse, slower] if halved else [setting, slower])]
+        (*space, time), size = march(runs, [(0, 1), (0, 2), (1, 2)] if halved else [(0, 1)], progress)
         spent += sum(run.seconds for run in runs)
-        parts = {name: _parts(pilots, setting, name, space, time, size[name]) for name in found.quantities}
-        estimated = max(sum(one.values()) for one in parts.values())
+        parts = {name: _parts(pilots, setting, name, [*space[:1], time], size[name]) for name in found.quantities}
+        for name in found.quantities if halved else []:
+            pilots.learn_power(name, *(one.values[name] for one in (space[0], time, space[1])))
+        estimated = max(together(one["space"], one["time"], pilots.power[name]) for name, one in parts.items())
         if estimated <= error or len(tries) == TRIES:
             break
-        choice = _finer(pilots, choice, parts, error, seconds)
+        choice = _next(pilots, choice, parts, error, seconds)
         if choice.setting == setting:
             break
         tries.append(choice)
@@ -226,22 +226,26 @@ def solve(
     return Answer(choice.scene, runs[0].simulation, estimated, parts, found, tries, spent)
 
 
-def _parts(
-    pilots: Pilots, setting: Setting, name: str, space: Distance, time: Distance, size: float
-) -> dict[str, float]:
-    """Relative errors of a quantity from the distances to half the mesh and to half the steps."""
-    found = {}
-    for part, gap, model, at in (
-        ("space", space.values[name], pilots.space[setting.mesh], pilots.size(setting.cells)),
-        ("time", time.values[name], pilots.time[setting.steps], float(setting.count)),
-    ):
-        order = model.order_to(name, at, gap, orders(pilots.scene, part))
-        found[part] = richardson(name, part, gap, order) / (size or 1.0)
-    return found
+def _parts(pilots: Pilots, setting: Setting, name: str, found: list[Distance], size: float) -> dict[str, float]:
+    """Relative errors of a quantity from the distances to half the mesh, if there is one, and to half the steps.
+
+    The part of space is that of the pilots where half the mesh cannot be graded: they had such a mesh and a finer one.
+    """
+    one, other = pilots.space[setting.mesh], pilots.time[setting.steps]
+    size_here, count = pilots.size(setting.cells), float(setting.count)
+    errors = {"space": one.at(name, size_here), "time": 0.0}
+    known = [("time", found[-1], other, count), ("space", found[0], one, size_here)][: len(found)]
+    for part, gap, model, at in known:
+        order = model.order_to(name, at, gap.values[name], orders(pilots.scene, part))
+        errors[part] = richardson(name, part, gap.values[name], order)
+    return {part: error / (size or 1.0) for part, error in errors.items()}
 
 
-def _finer(pilots: Pilots, choice: Choice, parts: dict[str, dict[str, float]], error: float, seconds: float) -> Choice:
-    """The next setting after one whose error turned out to be too large: the models are made to agree with what was found."""
+def _next(pilots: Pilots, choice: Choice, parts: dict[str, dict[str, float]], error: float, seconds: float) -> Choice:
+    """What is run after a setting whose error turned out to be too large: its models are made to agree with what was found.
+
+    Of every kind of mesh and steps; the most accurate one where none is predicted to err little enough.
+    """
     setting = choice.setting
     models = (
         ("space", pilots.space, setting.mesh, pilots.size(setting.cells)),
@@ -253,7 +257,9 @@ def _finer(pilots: Pilots, choice: Choice, parts: dict[str, dict[str, float]], e
         for name, found in parts.items():
             constant[name] = found[part] * (pilots.sizes[name] or 1.0) * float(at) ** model.order[name]
         models_of[kind] = replace(model, constant=constant)
-    return pilots.cheapest(setting.mesh, setting.steps, error / SAFETY, seconds, KEPT * _memory())
+    aim, room = error / SAFETY, KEPT * _memory()
+    choices = [pilots.cheapest(mesh, steps, aim, seconds, room) for mesh, steps in pilots.kinds()]
+    return min(choices, key=lambda one: (not one.met, one.seconds if one.met else one.error))
 
 
 def text(found: Plan) -> str:

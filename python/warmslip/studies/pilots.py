@@ -1,7 +1,8 @@
 """Pilot runs of a scene: how its errors and its cost depend on mesh and steps, and the cheapest setting of every kind.
 
-Errors are modelled by C h^p + D k^q for every kind of mesh (uniform, or graded to the singular corners) and of steps (equal,
-graded to t = 0, or chosen by a tolerance k^2), with constants and orders from pilot runs.
+Errors are modelled by a part C h^p of space for every kind of mesh (uniform, or graded to the singular corners) and a part D k^q
+of time for every kind of steps (equal, graded to t = 0, or chosen by a tolerance k^2), with constants and orders from pilot
+runs. So is how the parts add up: two that are largest at different times or places make less than their sum.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation, discretise
@@ -35,7 +37,24 @@ LARGEST = {2: 1024, 3: 64}  # cells along the shortest side that are considered
 MOST_STEPS = 100_000
 MOST_PILOT_CELLS = 100_000
 
+UNKNOWN = 0.1  # of the larger part: a smaller one does not show how parts add up
+
 Say = Callable[[str], None]
+
+
+def together(space: float, time: float, power: float) -> float:
+    """The error of two parts: their sum for a power of 1, and as if they were orthogonal for 2."""
+    larger = max(space, time)
+    return larger * ((space / larger) ** power + (time / larger) ** power) ** (1 / power) if larger > 0 else 0.0
+
+
+def power_of(space: float, time: float, both: float) -> float:
+    """The power in [1, 2] with which two parts make what they make together."""
+    if both >= space + time:
+        return 1.0
+    if both <= together(space, time, 2.0):
+        return 2.0
+    return float(brentq(lambda power: together(space, time, power) - both, 1.0, 2.0))
 
 
 @dataclass(frozen=True)
@@ -104,6 +123,7 @@ class Pilots:
         self.sizes = dict.fromkeys(QUANTITIES, 0.0)
         self.space: dict[str, Model] = {}
         self.time: dict[str, Model] = {}
+        self.power = dict.fromkeys(QUANTITIES, 1.0)  # with which the parts of space and time add up
         self.price: Price | None = None
         self._assembled: dict[str, Discretisation] = {}
         self._cells: dict[str, int] = {}  # the finest pilot of every kind of mesh, and of steps
@@ -150,10 +170,10 @@ class Pilots:
             self._assembled[key] = discretise(one)
         return Companion(one, Simulation(one, discretisation=replace(self._assembled[key], scene=one)))
 
-    def _march(self, settings: Sequence[Setting]) -> list[dict[str, float]]:
-        """Distances of neighbours, the finest pair first."""
+    def _march(self, settings: Sequence[Setting], pairs: Sequence[tuple[int, int]] = ()) -> list[dict[str, float]]:
+        """Distances of neighbours, the finest pair first, or of the given pairs."""
         runs = [self.companion(setting) for setting in settings]
-        found, size = march(runs, [(i, i + 1) for i in range(len(runs) - 1)])
+        found, size = march(runs, pairs or [(i, i + 1) for i in range(len(runs) - 1)])
         self.seconds += sum(run.seconds for run in runs)
         if self.seconds > self.limit:
             raise SceneError(f"the pilot runs alone took {self.seconds:.2g} s of CPU; allow more seconds")
@@ -181,16 +201,28 @@ class Pilots:
         )
 
     def measure_space(self, mesh: str, cells: int) -> None:
-        """Three meshes, up to so many cells along the shortest side, with few steps."""
+        """Three meshes, up to so many cells along the shortest side, with few steps; two where a third cannot be graded."""
         if self.file and self._cells_of_file * 2.0 ** (self.scene.mesh.dim * cells) > MOST_PILOT_CELLS:
             raise SceneError(
                 f"a pilot run on the file with refine = {cells} has too many cells; start from a coarser file"
             )
         self._cells[mesh] = cells
         sizes = [cells, cells - 1, cells - 2] if self.file else [cells, cells // 2, cells // 4]
+        sizes = [one for one in sizes if self.gradable(mesh, one)] if not self.file else sizes
         self._say(f"pilot runs: {mesh} meshes up to {'refine = ' if self.file else 'n = '}{cells}")
-        gaps = self._march([Setting(mesh, "equal", one, self.count) for one in sizes])
+        settings = [Setting(mesh, "equal", one, self.count) for one in sizes]
+        slower = Setting(mesh, "equal", sizes[1], self.count // 2)
+        last = len(settings)
+        pairs = [*((i, i + 1) for i in range(last - 1)), (1, last), (0, last)]
+        *gaps, time, both = self._march([*settings, slower], pairs)
         self.space[mesh] = self._model("space", gaps, self.size(cells))
+        for name in self.quantities:
+            self.learn_power(name, gaps[0][name], time[name], both[name])
+
+    def learn_power(self, name: str, space: float, time: float, both: float) -> None:
+        """How the parts of a quantity add up, from three distances; what was known stays where one part hardly matters."""
+        if min(space, time) > UNKNOWN * max(space, time):
+            self.power[name] = power_of(space, time, both)
 
     def measure_time(self, steps: str, count: int) -> None:
         """Three clocks, with up to so many steps, on a coarse mesh."""
@@ -199,6 +231,11 @@ class Pilots:
         self._say(f"pilot runs: {steps} steps, up to {count}")
         gaps = self._march([Setting("uniform", steps, cells, one) for one in (count, count // 2, count // 4)])
         self.time[steps] = self._model("time", gaps, float(count))
+
+    def gradable(self, mesh: str, cells: int) -> bool:
+        """Whether a mesh of so many cells along the shortest side exists: a graded one needs half of them as well."""
+        counts = [unit * cells for unit in self._unit]
+        return mesh == "uniform" or (cells % 2 == 0 and min(counts) >= 2 * COARSEST)
 
     def look_closer(self, found: Sequence[Choice]) -> bool:
         """Another pilot run where it is worth its cost; whether there was one.
@@ -244,7 +281,7 @@ class Pilots:
             if self.sizes[name] > 0:
                 space = self.space[setting.mesh].at(name, self.size(setting.cells))
                 time = self.time[setting.steps].at(name, float(setting.count))
-                worst = max(worst, (space + time) / self.sizes[name])
+                worst = max(worst, together(space, time, self.power[name]) / self.sizes[name])
         return worst
 
     def cost(self, setting: Setting) -> tuple[float, float]:
@@ -269,9 +306,7 @@ class Pilots:
         else:
             side = min(self._unit)
             sizes = sorted({base * 2**i for base in range(4, 8) for i in range(9) if base * 2**i * side <= LARGEST[d]})
-            sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8]
-            if mesh == "graded":  # also on half the cells, which the companions have
-                sizes = [n for n in sizes if n % 4 == 0 and n * side >= 4 * COARSEST]
+            sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8 and self.gradable(mesh, n)]
         counts = sorted({4 * max(2, round(2 ** (i / 3))) for i in range(45)})
         return [Setting(mesh, steps, cells, count) for cells in sizes for count in counts if count <= MOST_STEPS]
 
