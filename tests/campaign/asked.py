@@ -90,8 +90,10 @@ def true_error(answer: ask.Answer) -> float:
     What that run errs itself is added: the estimated parts of the answer, reduced by the orders that its pilots showed.
     """
     one, setting, orders = answer.scene, answer.tries[-1].setting, answer.plan.orders
-    ratio, many = CELLS[one.mesh.dim], SHORTER[one.mesh.dim]
-    finer: dict[str, Any] = {"mesh.n": [round(ratio * n) for n in one.mesh.counts]}
+    (n, *_), many = one.mesh.counts, SHORTER[one.mesh.dim]
+    cells = 2 * round(CELLS[one.mesh.dim] * n / 2)  # a graded mesh is made from half of them
+    ratio = cells / n
+    finer: dict[str, Any] = {"mesh.n": cells}
     if one.time.tolerance is not None:
         reference = Recording(Companion(one.override(**(finer | {"time.tolerance": one.time.tolerance / many**2}))))
         found, size = reference.distance(Companion(one)), reference.size

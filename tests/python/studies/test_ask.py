@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from campaign import asked
 from support.processes import Command
@@ -126,6 +127,41 @@ def test_an_order_is_also_seen_between_pilot_and_answer(p: float) -> None:
     assert model.order_to("u_V", 40.0, 40.0**-p, (0.1, 0.3)) == 0.3
     assert model.order_to("u_V", 10.0, 10.0**-p, (0.1, 2.0)) == 0.4  # too near to each other
     assert model.order_to("u_V", 40.0, 0.0, (0.1, 2.0)) == 0.4
+
+
+@pytest.mark.parametrize("power", [1.0, 1.3, 2.0])
+@pytest.mark.parametrize("time", [0.3, 1.0, 3.0])
+def test_how_parts_add_up_is_found_from_three_distances(power: float, time: float) -> None:
+    both = pilots.together(1.0, time, power)
+    assert both == pytest.approx((1 + time**power) ** (1 / power), rel=1e-14)
+    assert pilots.power_of(1.0, time, both) == pytest.approx(power, rel=1e-9)
+    assert pilots.power_of(1.0, time, 2 + time) == 1.0 and pilots.power_of(1.0, time, 0.0) == 2.0
+    assert pilots.together(0.0, 0.0, power) == 0.0
+
+
+def test_a_part_that_hardly_matters_does_not_tell_how_parts_add_up() -> None:
+    runs = pilots.Pilots(warmslip.load("heat_slab"), ["theta_L2"], lambda _: None)
+    runs.learn_power("theta_L2", 1.0, 0.5, np.hypot(1.0, 0.5))
+    assert runs.power["theta_L2"] == pytest.approx(2.0)
+    runs.learn_power("theta_L2", 1.0, 0.01, 1.01)
+    assert runs.power["theta_L2"] == pytest.approx(2.0)
+
+
+def test_a_coarse_graded_mesh_in_space_is_found() -> None:
+    """Half of it cannot be graded: its error in space is that of the pilot runs."""
+    answer = ask.solve(asked.scene(10), 0.25, seconds=30.0)
+    (choice,) = answer.tries
+    assert choice.setting.mesh == "graded" and choice.setting.cells < 16
+    graded = next(one for one in answer.plan.alternatives if one.setting.mesh == "uniform")
+    assert graded.seconds > 4 * choice.seconds
+    assert asked.true_error(answer) <= 0.25
+
+
+def test_the_next_setting_may_be_of_another_kind() -> None:
+    """Equal steps err more than their pilots showed, and graded ones are cheaper then."""
+    answer = ask.solve(asked.scene(17), 0.1, seconds=5.0)
+    assert [one.setting.steps for one in answer.tries] == ["equal", "graded"]
+    assert asked.true_error(answer) <= 0.1
 
 
 def test_singular_corners_ask_for_a_graded_mesh() -> None:
