@@ -32,6 +32,7 @@ SECONDS = {2: 5.0, 3: 30.0}  # CPU seconds that are allowed
 # cells, counts, cells of the reference
 GRID = {2: ([16, 24, 40], [8, 32, 64], 48), 3: ([4, 8, 12], [4, 16], 16)}
 CELLS = {2: 2.0, 3: 1.5}  # of the reference of an answer for one of its own, along a side
+NESTED = 12  # cells up to which it has twice as many
 SHORTER = {2: 4, 3: 2}  # steps of a reference for one of an answer, or of the largest count of the grid
 LONGEST = {2: 1.0, 3: 5.0}  # CPU seconds of a setting of the grid
 UNSURE = 1.5  # factor between the seconds of two runs that may be one
@@ -91,7 +92,8 @@ def true_error(answer: ask.Answer) -> float:
     """
     one, setting, orders = answer.scene, answer.tries[-1].setting, answer.plan.orders
     (n, *_), many = one.mesh.counts, SHORTER[one.mesh.dim]
-    cells = 2 * round(CELLS[one.mesh.dim] * n / 2)  # a graded mesh is made from half of them
+    # a graded mesh is made from half of its cells; distances of meshes that are not nested are too large
+    cells = 2 * n if n <= NESTED else 2 * round(CELLS[one.mesh.dim] * n / 2)
     ratio = cells / n
     finer: dict[str, Any] = {"mesh.n": cells}
     if one.time.tolerance is not None:

@@ -29,6 +29,7 @@ CLOSER = 0.1  # share of the cost of a choice that another pilot run is worth
 AGAIN = 0.25  # or share of what the pilots have cost
 SPENT = 0.5  # share of the seconds that are allowed which such runs may take
 BINDING = 0.3  # share of the error of a setting from which on a part of it matters
+ASSUMED = 0.9  # order of a mesh of which there are but two pilots
 HALVINGS = 8  # of the first block of graded steps
 EXPONENTS = {2: (2.2, 3.0), 3: (4.0, 6.0)}  # of cells an axis, in the cost of a step and of a factorization
 MESHES, STEPS = ("uniform", "graded"), ("equal", "graded", "adaptive")
@@ -192,7 +193,7 @@ class Pilots:
 
     def _model(self, part: str, gaps: list[dict[str, float]], size: float) -> Model:
         least, most = orders(self.scene, part)
-        seen = {name: order([gap[name] for gap in reversed(gaps)], least, most, 1.0) for name in QUANTITIES}
+        seen = {name: order([gap[name] for gap in reversed(gaps)], least, most, ASSUMED) for name in QUANTITIES}
         return Model(
             {name: richardson(name, part, gaps[0][name], seen[name]) * size ** seen[name] for name in QUANTITIES},
             seen,
