@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -23,6 +24,7 @@ from warmslip.model.loads import Loads
 from warmslip.model.probes import probes
 from warmslip.model.state import State
 from warmslip.records import provenance
+from warmslip.scene.overrides import differing
 from warmslip.scene.scene import Scene
 from warmslip.simulation import checkpoint, folder_lock
 from warmslip.simulation.signals import Interruption
@@ -31,6 +33,8 @@ from warmslip.simulation.summary import numbers, summary, trusted_digits
 
 if TYPE_CHECKING:
     from warmslip.io.plot import Plot
+
+log = logging.getLogger(__name__)
 
 Observer = Callable[[State, Any], None]
 
@@ -200,14 +204,22 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
         simulation.comm.rank == 0 and not simulation.discretisation.user_functions and (folder / "final.vtu").exists()
     ):  # else the disk was full
         try:
-            answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-            stamp = answer["stamp"]
-            same = (stamp["scene_hash"], stamp["fingerprint"]) == (simulation.scene.digest(), provenance.fingerprint())
-            if answer["outcome"] == "completed" and same and not answer["functions"]:
-                with Trajectory(folder / "trajectory.h5") as t:
-                    u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
-                    if float(t.time[-1]) == simulation.scene.time.end:
-                        found = Result(answer, u, w, theta, folder / "trajectory.h5")
+            scene, answer = simulation.scene, json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+            with Trajectory(folder / "trajectory.h5") as t:
+                u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
+                end, stored = float(t.time[-1]), t.scene
+            told = {name: stored.get(name) for name in ("output", "title")}  # they change no step
+            stamp, digest = answer["stamp"], scene.override(**told).digest()
+            same = (stamp["scene_hash"], stamp["fingerprint"]) == (digest, provenance.fingerprint())
+            if answer["outcome"] == "completed" and same and not answer["functions"] and end == scene.time.end:
+                found = Result(answer, u, w, theta, folder / "trajectory.h5")
+                if keys := [key for key in differing(stored, scene.resolved()) if key.startswith("output.")]:
+                    log.warning(
+                        "the run in '%s' is complete and stays as it is; %s would change steps that are still to come: run it "
+                        "without --resume to store others",
+                        folder,
+                        ", ".join(keys),
+                    )
         except (OSError, ValueError, LookupError, TypeError):
             pass  # then it is run
     return simulation.comm.bcast(found, root=0)  # type: ignore[no-any-return]

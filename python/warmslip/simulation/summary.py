@@ -10,27 +10,19 @@ import numpy as np
 
 from warmslip._core import compiler, petsc_version
 from warmslip.io import part_series
-from warmslip.model.state import largest_values, resultants
+from warmslip.model.state import State, largest_values, resultants
 from warmslip.records import provenance
 from warmslip.simulation.simulation import Simulation
 from warmslip.simulation.statistics import digits
+
+STATUSES = ("open", "stick", "slip")
 
 
 def summary(simulation: Simulation) -> dict[str, Any]:
     """Outcome, norms, contact, balances, cost and stamp of a run as it stands (collective)."""
     s, d, report = simulation.stepper, simulation.discretisation, simulation.report
     norms, cost, statistics = d.norms, s.cost, simulation.statistics
-    contact = dict.fromkeys(("normal_force", "tangential_force", "max_penetration"), 0.0)
-    counts = {"open": len(d.surface.weights), "stick": 0, "slip": 0}
-    traction = [0.0] * d.dim
-    if report is not None:
-        contact = {
-            "normal_force": report.normal_force,
-            "tangential_force": float(np.linalg.norm(report.friction_traction)),
-            "max_penetration": report.max_penetration,
-        }
-        counts = {name: getattr(report, name) for name in counts}
-        traction = list(report.traction)
+    contact, counts, traction = _contact(simulation)
     counters = {name: getattr(cost, name) for name in type(cost).items}
     force = np.reshape(s.contact_force, (1, -1, d.dim))
     parts = {name: float(values[0]) for name, values in resultants(d, force).items()}
@@ -71,6 +63,30 @@ def summary(simulation: Simulation) -> dict[str, Any]:
             petsc_options=petsc_options(),
         ),
     }
+
+
+def _contact(simulation: Simulation) -> tuple[dict[str, float], dict[str, int], list[float]]:
+    """Resultants and the largest penetration, points by status, and the force on the body, of the last step."""
+    s, d, report = simulation.stepper, simulation.discretisation, simulation.report
+    if report is not None:
+        contact = {
+            "normal_force": report.normal_force,
+            "tangential_force": float(np.linalg.norm(report.friction_traction)),
+            "max_penetration": report.max_penetration,
+        }
+        return contact, {name: getattr(report, name) for name in STATUSES}, list(report.traction)
+    # no step was taken in this process: what the state says
+    force, status = np.reshape(s.contact_force, (-1, d.dim)), np.asarray(s.status, dtype=int)
+    normals = np.asarray(d.surface.normals).reshape(-1, d.dim)
+    pressing = np.sum(force * normals, axis=1)
+    gap = State(d, s, simulation.taken).contact["gap"] if simulation.taken and len(force) else np.zeros(1)
+    contact = {
+        "normal_force": float(pressing.sum()),
+        "tangential_force": float(np.linalg.norm((force - pressing[:, None] * normals).sum(axis=0))),
+        "max_penetration": max(0.0, float(-gap.min())),
+    }
+    counts = {name: int(np.sum(status == number)) for number, name in enumerate(STATUSES)}
+    return contact, counts, [0.0 if one == 0 else -float(one) for one in force.sum(axis=0)]
 
 
 def numbers(summary: dict[str, Any]) -> dict[str, str]:

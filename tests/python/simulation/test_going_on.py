@@ -278,3 +278,31 @@ def test_ctrl_c_ends_a_loop_in_python(tmp_path: Path) -> None:
     assert done.returncode in (-signal.SIGINT, 130)
     assert "KeyboardInterrupt" in done.stderr
     assert (tmp_path / "checkpoint.npz").exists()
+
+
+def contact_numbers(result: warmslip.Result) -> dict[str, Any]:
+    return {name: value for name, value in result.summary["contact"].items() if name != "parts"}
+
+
+def test_a_complete_run_stays_as_it_is(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    whole = warmslip.run(scene(), out=tmp_path)
+    assert whole.summary["contact"]["normal_force"] > 0
+    files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for keys in ({}, {"output.every": 2}):
+        again = warmslip.run(scene(**keys), out=tmp_path, resume=True)
+        assert again.summary == whole.summary
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
+    (told,) = caplog.messages
+    assert "is complete and stays as it is; output.every would change" in told
+
+
+def test_a_summary_that_was_lost_is_written_from_the_state(tmp_path: Path) -> None:
+    """No step is left to take: forces, statuses and penetration are those of the stored state."""
+    whole = warmslip.run(scene(), out=tmp_path)
+    (tmp_path / "summary.json").unlink()
+    again = warmslip.run(scene(), out=tmp_path, resume=True)
+    one, other = contact_numbers(whole), contact_numbers(again)
+    assert min(one["normal_force"], one["max_penetration"], one["slip"] + one["stick"]) > 0
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        np.testing.assert_allclose(other[name], value, rtol=1e-13)
