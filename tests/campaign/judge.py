@@ -84,9 +84,11 @@ def run(scene: Scene, backend: str = "automatic") -> Ran:
 
 
 def stated(ran: Ran, field: str) -> float:
-    """The error that the run's own digits allow a field, a digit to spare; TOLERANCE where they allow less."""
+    """The error that the run's own digits allow a field, a digit to spare: TOLERANCE at least, and any where there is none."""
     digits = (ran.digits or {}).get({"w": "u", "force": "contact_force"}.get(field, field))
-    return TOLERANCE if digits is None else max(TOLERANCE, 10.0 ** (1 - digits))
+    if digits is None:
+        return TOLERANCE
+    return max(TOLERANCE, 10.0 ** (1 - digits)) if digits >= 1 else float("inf")
 
 
 class Judge:

@@ -40,6 +40,18 @@ def test_ends_right_with_petsc(name: str) -> None:
     well(name, judge.run(warmslip.load(FOLDER / f"{name}.toml"), backend="petsc"))
 
 
+@pytest.mark.parametrize("backend", ["automatic", "petsc"])
+@pytest.mark.parametrize("path", sorted((FOLDER / "doubtful").glob("*.toml")), ids=lambda path: path.stem)
+def test_what_doubles_may_not_hold_is_said(path: Path, backend: str) -> None:
+    """Rounding decides: the run stops, or its digits say how little is known."""
+    scene = warmslip.load(path)
+    simulation = judge.run(scene, backend=backend)
+    if simulation.outcome == "completed":
+        assert judge.judge(scene, simulation)["class"] in ("right", "right_as_stated")
+    else:
+        assert simulation.outcome == "precision_lost"
+
+
 def read(folder: Path) -> judge.Ran:
     """A run that was written."""
     summary = json.loads((folder / "summary.json").read_text())

@@ -232,8 +232,9 @@ template <int d>
 bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution) {
   Linearisation at = linearise(problem, solution.added, solution.rigid);
   const Eigen::Index all = compliance_.rows();
-  ContactSolution<d> best;    // the tolerance is met: one step more may reach round-off
-  double best_rest = 0;       // what its forces leave of their own equations
+  ContactSolution<d> best;  // the tolerance is met: one step more may reach round-off
+  double best_rest = 0;     // what its forces leave of their own equations
+  const double rounding = 1e-2 * options_.tolerance;
   bool best_settled = false;  // whether that is little beside them
   int best_step = 0;
   std::vector<int> tried;  // statuses of the step before
@@ -263,8 +264,8 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
         best_step = step;
       }
       best.converged = true;
-      if (!helped || (settled && solution.law_residual <= 1e-2 * options_.tolerance)) break;
-    } else if (best.converged && (best_settled || step >= best_step + patience)) {
+      if (!helped || (settled && solution.law_residual <= rounding)) break;
+    } else if (best.converged && (best_settled || best.law_residual <= rounding || step >= best_step + patience)) {
       break;
     }
     if (step >= options_.newton_steps) {
@@ -318,10 +319,21 @@ void ContactSolver<d>::polish(const ContactProblem<d>& problem, ContactSolution<
 
 template <int d>
 bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change,
-                               ContactSolution<d>& solution) {
+                               const std::vector<bool>& resting, ContactSolution<d>& solution) {
   const Eigen::Index all = compliance_.rows();
   Linearisation at =
       linearise(problem, Eigen::VectorXd::Zero(all), Eigen::VectorXd(Eigen::VectorXd::Zero(rigid_.count())));
+  for (std::size_t i = 0; i < resting.size(); ++i) {
+    if (!resting[i]) continue;
+    PointResidual<d>& point = at.points[i];
+    const Point<d>& nu = problem.points[i].normal;
+    const Tensor2<d> normal = nu * nu.transpose();
+    point.by_force = (normal * point.by_force * normal).eval();
+    point.by_velocity = (normal * point.by_velocity * normal).eval() -
+                        1 / diagonal_block(problem, i).tangential * (Tensor2<d>::Identity() - normal);
+    point.status = Status::stick;
+    at.key[i] = point.key();
+  }
   factor(problem, at, solution);
   for (Eigen::Index row = 0; row < all; row += d)
     at.value.template segment<d>(row) =
@@ -347,7 +359,8 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
   template bool ContactSolver<d>::accept(const ContactProblem<d>&, ContactSolution<d>&) const;                        \
   template bool ContactSolver<d>::newton(const ContactProblem<d>&, bool, ContactSolution<d>&);                        \
   template void ContactSolver<d>::polish(const ContactProblem<d>&, ContactSolution<d>&);                              \
-  template bool ContactSolver<d>::respond(const ContactProblem<d>&, const Eigen::VectorXd&, ContactSolution<d>&);
+  template bool ContactSolver<d>::respond(const ContactProblem<d>&, const Eigen::VectorXd&, const std::vector<bool>&, \
+                                          ContactSolution<d>&);
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)
 

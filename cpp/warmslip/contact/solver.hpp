@@ -18,9 +18,10 @@ class ContactSolver {
   ContactSolution<d> solve(const ContactProblem<d>& problem, const Eigen::VectorXd& force);
 
   /// What a small change of the free velocities, (d points), and of the load on the rigid motions, `problem.rigid`,
-  /// adds to a solution that is the known one of `problem`, statuses kept: `added`, `force` and `rigid` of it. False
-  /// where the tangent is singular.
-  bool respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change, ContactSolution<d>& solution);
+  /// adds to a solution that is the known one of `problem`, statuses kept: `added`, `force` and `rigid` of it. Points
+  /// that are `resting` (points; none if empty) stick whatever they do. False where the tangent is singular.
+  bool respond(const ContactProblem<d>& problem, const Eigen::VectorXd& change, const std::vector<bool>& resting,
+               ContactSolution<d>& solution);
 
   /// Drops the remembered tangent: the next solve does what a new solver would, to the last bit.
   void clear_cache() { tangent_status_.clear(); }

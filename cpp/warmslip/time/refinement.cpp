@@ -8,6 +8,8 @@
 namespace warmslip {
 namespace {
 
+constexpr int hard = 15;  // iterations of the contact solver from which on a step is measured
+
 double largest_entry(Vec v) {
   PetscReal value = 0;
   if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
@@ -50,6 +52,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
   ContactSolution<d> change, again;
   correction_force_ = Eigen::VectorXd::Zero(next_.contact_force.size());
+  Eigen::VectorXd cause;
   double crept = 0;  // what the contact leaves of motions that it stops, whether its response takes it away or not
   if (systems_->contact) {
     const Eigen::VectorXd velocity = sliding(next_.w);
@@ -60,8 +63,8 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     again = contact;
     const Eigen::VectorXd left = apply ? Eigen::VectorXd() : creep(contact);
     crept = largest_entry(left);
-    if (!(apply ? solve_contact(contact.force, again) : respond(correction + left + rounding(velocity), again)))
-      return false;
+    if (!apply) cause = correction + left + rounding(velocity);
+    if (!(apply ? solve_contact(contact.force, again) : respond(cause, {}, again))) return false;
     if (apply) free_ = posed_.free;
     change = again;
     change.force = again.added;
@@ -102,6 +105,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   if (systems_->contact) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
          largest_entry(surface_.to_nodes(contact.force)), balances.contact_scale);
+    if (!apply) extents_.contact_force.tried = std::max(extents_.contact_force.tried, change_at_rest(cause, contact));
     correction_force_ = change.force;
     extents_.force = std::max(extents_.force, balances.force_scale);
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
@@ -185,10 +189,39 @@ void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
 
 // The response of the contact; every rank found it, and they agree whether there is one.
 template <int d>
-bool Stepper<d>::respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact) {
-  int found = systems_->contact->respond(posed_, correction, contact);
+bool Stepper<d>::respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting,
+                         ContactSolution<d>& contact) {
+  int found = systems_->contact->respond(posed_, correction, resting, contact);
   MPI_Bcast(&found, 1, MPI_INT, 0, layout_.comm());
   return found != 0;
+}
+
+// The largest change of a nodal contact force if points stick whose slip is no larger than ten times its own error:
+// their friction may point the other way. Zero where no slip is that small.
+template <int d>
+double Stepper<d>::change_at_rest(const Eigen::VectorXd& cause, const ContactSolution<d>& contact) {
+  const Eigen::VectorXd velocity = sliding(next_.w), error = surface_.at_points(surface_.nodal_values(correction_w_));
+  const auto across = [&](const auto& vectors, Eigen::Index i) -> Point<d> {
+    const Point<d> nu = surface_.normals().row(i).transpose(), v = vectors.template segment<d>(i * d);
+    return v - v.dot(nu) * nu;
+  };
+  std::vector<bool> resting;
+  bool any = false;
+  for (Eigen::Index i = 0; i < surface_.points(); ++i) {
+    const auto point = static_cast<std::size_t>(i);
+    resting.push_back(contact.status[point] == Status::slip && !surface_.prescribed(i) &&
+                      posed_.law(point).friction.present() && posed_.law(point).friction.regularisation == 0 &&
+                      across(velocity, i).norm() <= 10 * across(error, i).norm());
+    any = any || resting.back();
+  }
+  ContactSolution<d> change = contact;
+  if (!any || !respond(cause, resting, change)) return 0;
+  const Eigen::VectorXd changed = surface_.to_nodes(change.added).cwiseAbs(),
+                        borne = surface_.to_nodes(contact.force).cwiseAbs();
+  double largest = 0;  // friction that turns round changes no force by more than twice what a node bears
+  for (Eigen::Index i = 0; i < changed.size(); i += d)
+    largest = std::max(largest, std::min(changed.segment<d>(i).maxCoeff(), 2 * borne.segment<d>(i).norm()));
+  return largest;
 }
 
 // The slip of points that stick and the motion of points that press beyond the depth of their force, (d points). The
@@ -325,6 +358,7 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
 template <int d>
 bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
   if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
+  if (contact.iterations > hard) return true;
   for (double step = 1, n = taken_ + 1; step <= n; step *= options_.measured_steps)
     if (step == n) return true;
   return false;

@@ -201,7 +201,8 @@ class Stepper {
   bool correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool apply);
   void correct_heat(const StepInputs& inputs, const Balances& balances, bool apply);
   static void note(double& error, Extent& field, double change, double size, double least);
-  bool respond(const Eigen::VectorXd& correction, ContactSolution<d>& contact);
+  bool respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting, ContactSolution<d>& contact);
+  double change_at_rest(const Eigen::VectorXd& cause, const ContactSolution<d>& contact);
   Motion motion_of(const ContactSolution<d>& contact) const;
   void undo(const Motion& motion, ContactSolution<d>& contact);
   Eigen::VectorXd creep(const ContactSolution<d>& contact) const;
