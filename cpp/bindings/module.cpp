@@ -1,8 +1,19 @@
+#include <csignal>
+
 #include "bindings.hpp"
 
 using namespace warmslip::bindings;
 
 namespace {
+
+// Initialises PETSc and MPI. A reader of the output that has seen enough raises Python's own error afterwards, and not
+// PETSc's banner.
+void start_petsc() {
+  struct sigaction before {};
+  sigaction(SIGPIPE, nullptr, &before);
+  py::module_::import("petsc4py.PETSc");
+  sigaction(SIGPIPE, &before, nullptr);
+}
 
 // Two PETSc libraries in one process end in a crash far from its cause: say so at import.
 void check_petsc() {
@@ -24,7 +35,7 @@ PYBIND11_MODULE(_core, m) {
   m.doc() =
       "The compiled core of warmslip: meshes, operators on PETSc, the contact solver and the time stepper, for d = 2 "
       "and 3.";
-  py::module_::import("petsc4py.PETSc");  // initialises PETSc and MPI
+  start_petsc();
   check_petsc();
   py::register_exception_translator([](std::exception_ptr p) {
     try {

@@ -84,8 +84,6 @@ for panel, commands in PANELS.items():
 def main() -> None:
     """Entry point: expected errors become sentences and an exit code; WARMSLIP_DEBUG keeps their tracebacks."""
     os.environ.setdefault("MPLBACKEND", "Agg")  # files are drawn, and no window
-    # a reader of the output that has seen enough ends the command, and not with a banner of PETSc
-    os.environ["PETSC_OPTIONS"] = f"-no_signal_handler {os.environ.get('PETSC_OPTIONS', '')}"
     try:
         code = app(
             prog_name="warmslip", standalone_mode=False

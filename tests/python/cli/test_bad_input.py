@@ -114,6 +114,24 @@ def test_a_reader_that_has_seen_enough_ends_a_command(words: str, tmp_path: Path
     assert (tmp_path / "run/summary.json").exists() == words.startswith("run")
 
 
+def test_a_program_whose_output_nobody_reads_gets_the_error_of_python(tmp_path: Path) -> None:
+    program = (
+        "import warmslip\nwarmslip.run(warmslip.load('heat_slab').override(**{'time.steps': 1}))\nprint(1, flush=True)"
+    )
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        env=child_environment(),
+        text=True,
+    )
+    os.close(writing)
+    assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
+
+
 def test_meshes_of_other_kinds_and_with_a_byte_order_mark(tmp_path: Path) -> None:
     scene = warmslip.load("plate_with_hole")
     for suffix in (".vtk", ".stl"):
