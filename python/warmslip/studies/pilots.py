@@ -22,7 +22,7 @@ from warmslip.scene.mesh_table import COARSEST
 from warmslip.scene.scene import Scene
 from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import QUANTITIES, Companion, march, order
-from warmslip.studies.error_estimate import orders, richardson
+from warmslip.studies.error_estimate import JUMPS, orders, richardson
 
 FAR = 2.5  # of a choice from its pilots, in cells along a side or steps
 CLOSER = 0.1  # share of the cost of a choice that another pilot run is worth
@@ -126,6 +126,8 @@ class Pilots:
         self.time: dict[str, Model] = {}
         self.power = dict.fromkeys(QUANTITIES, 1.0)  # with which the parts of space and time add up
         self.price: Price | None = None
+        # their errors in space grow with the number of steps: pilots with few of them say little
+        self._undamped = orders(scene, "time")[0] == JUMPS
         self._assembled: dict[str, Discretisation] = {}
         self._cells: dict[str, int] = {}  # the finest pilot of every kind of mesh, and of steps
         self._counts: dict[str, int] = {}
@@ -207,9 +209,11 @@ class Pilots:
             raise SceneError(
                 f"a pilot run on the file with refine = {cells} has too many cells; start from a coarser file"
             )
-        self._cells[mesh] = cells
         sizes = [cells, cells - 1, cells - 2] if self.file else [cells, cells // 2, cells // 4]
         sizes = [one for one in sizes if self.gradable(mesh, one)] if not self.file else sizes
+        if len(sizes) < 3 and self._undamped:
+            raise SceneError("errors of waves need three graded meshes; the third cannot be graded")
+        self._cells[mesh] = cells
         self._say(f"pilot runs: {mesh} meshes up to {'refine = ' if self.file else 'n = '}{cells}")
         settings = [Setting(mesh, "equal", one, self.count) for one in sizes]
         slower = Setting(mesh, "equal", sizes[1], self.count // 2)
@@ -308,6 +312,8 @@ class Pilots:
             side = min(self._unit)
             sizes = sorted({base * 2**i for base in range(4, 8) for i in range(9) if base * 2**i * side <= LARGEST[d]})
             sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8 and self.gradable(mesh, n)]
+            if self._undamped:  # so that the run has a companion on half of them
+                sizes = [n for n in sizes if self.gradable(mesh, n // 2)]
         counts = sorted({4 * max(2, round(2 ** (i / 3))) for i in range(45)})
         return [Setting(mesh, steps, cells, count) for cells in sizes for count in counts if count <= MOST_STEPS]
 

@@ -157,6 +157,20 @@ def test_a_coarse_graded_mesh_in_space_is_found() -> None:
     assert asked.true_error(answer) <= 0.25
 
 
+def test_waves_without_damping_need_three_graded_meshes() -> None:
+    """Their errors in space grow with the number of steps, and pilots have few."""
+    runs = pilots.Pilots(asked.scene(14), ["u_V"], lambda _: None)
+    assert asked.scene(14).mesh.dim == 3 and asked.scene(14).viscosity is None
+    with pytest.raises(SceneError, match="three graded meshes"):
+        runs.measure_space("graded", 16)
+    flat = pilots.Pilots(
+        build({key: value for key, value in SUDDEN.items() if key != "viscosity"}), ["u_V"], lambda _: None
+    )
+    damped = pilots.Pilots(build(SUDDEN), ["u_V"], lambda _: None)
+    fewest = [min(one.cells for one in runs.settings("graded", "equal")) for runs in (flat, damped)]
+    assert fewest == [16, 8]
+
+
 def test_the_next_setting_may_be_of_another_kind() -> None:
     """Equal steps err more than their pilots showed, and graded ones are cheaper then."""
     answer = ask.solve(asked.scene(17), 0.1, seconds=5.0)
