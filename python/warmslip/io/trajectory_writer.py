@@ -87,14 +87,10 @@ class TrajectoryWriter:
         elif not earlier.exists():  # else a resumed run was killed while it copied
             os.replace(path, earlier)
         self._ballast = Ballast(path.parent)
-        try:
-            file = self._file = h5py.File(path, "w", libver="latest")
-        except OSError as error:
-            if "already open" not in str(error):
-                raise
-            raise ValueError(
-                f"{path} is open in this program; close its Trajectory, or choose another folder"
-            ) from None
+        if _is_open(path):
+            raise ValueError(f"{path} is open in this program; close its Trajectory, or choose another folder")
+        path.unlink(missing_ok=True)  # another program that reads it keeps the file it has
+        file = self._file = h5py.File(path, "w", libver="latest")
         file.attrs["scene"] = json.dumps(discretisation.scene.resolved())
         file.attrs["digest"] = discretisation.scene.digest()
         file.attrs["functions"] = json.dumps(discretisation.user_functions)
@@ -134,7 +130,6 @@ class TrajectoryWriter:
         self._parts.create(file, table)
         if keep:
             self._copy(earlier, keep)
-            self._stored = keep if keep % discretisation.scene.output.every == 0 else -1
         file.swmr_mode = True  # readable to the last flush, also when the process is killed
 
     def _append(self, name: str, value: Any) -> None:
@@ -171,11 +166,11 @@ class TrajectoryWriter:
         assert self._file is not None
         # a killed writer leaves its mark, which this way of reading looks past
         with h5py.File(earlier, "r", libver="latest", swmr=True) as file:
-            every = self._d.scene.output.every
             reached = step_numbers(np.asarray(file["states/time"]), np.asarray(file["steps/time"]))
-            due = np.flatnonzero(
-                (reached <= keep) & (reached % every == 0)
-            )  # not the last one of a run that was stopped
+            # the last one of a run that was stopped, which no cadence asked for, goes
+            stopped = reached[-1] % (json.loads(file.attrs["scene"])["output"] or {}).get("every", 1)
+            due = np.flatnonzero((reached <= keep) & ((reached < reached[-1]) | (stopped == 0)))
+            self._stored = int(reached[due][-1]) if len(due) else -1
             for name in self._file["states"]:
                 self._take(file, f"states/{name}", due)
             for group in ("steps", "balances"):
@@ -246,3 +241,9 @@ class TrajectoryWriter:
             self.write()
             self._ballast.release()
             self._file.close()
+
+
+def _is_open(path: Path) -> bool:
+    """Whether this program has a file open, to read or to write."""
+    names = [h5py.h5f.get_name(one) for one in h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)]
+    return path.exists() and any(os.path.exists(name) and os.path.samefile(name, path) for name in names)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,13 @@ from warmslip.model.point_location import interpolated
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
 
+log = logging.getLogger(__name__)
+
 SAME = 1e-9  # relative difference of times that are one
 FITS = 1e-6  # relative to the displacement: how far supports may be from the state that a run begins with
-NEAR = 0.5  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with
+BETWEEN = 0.05  # likewise where the state is interpolated between two meshes
+NEAR = 0.2  # of a cell: how far nodes may lie outside of the mesh of the run that they begin with, at a curved boundary
+SIZE = 0.02  # by how much sizes of two meshes of one body may differ
 
 
 def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array, Array, Array]:
@@ -32,8 +37,16 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
     """
     initial, x, d = scene.initial, np.asarray(mesh.nodes), scene.mesh.dim
     if initial.run is not None:
-        u, w, theta = _stored(mesh, initial.run, initial.time)
-        _refuse_jump(vectors, initial.run, u)
+        found = _read(initial.run, initial.time)
+        _refuse_another_body(found, x, initial.run)
+        for name, needed, there in (
+            ("temperature", scene.heat is not None, found.theta),
+            ("displacement", scene.moves, found.u),
+        ):
+            if needed and there is None:
+                log.warning("initial.from: the run in '%s' has no %s; it is taken as 0 at the start", initial.run, name)
+        u, w, theta = _on_mesh(found, mesh)
+        _refuse_jump(vectors, initial.run, u, FITS if _same(found, mesh) else BETWEEN)
         return u, w, theta
 
     def start(name: str, components: int) -> Array:
@@ -43,12 +56,13 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
     return start("displacement", d), start("velocity", d), start("temperature", 1)[:, 0]
 
 
-def _stored(mesh: Any, run: str, time: float | None) -> tuple[Array, Array, Array]:
+def _same(found: _Stored, mesh: Any) -> bool:
+    return np.array_equal(found.nodes, np.asarray(mesh.nodes)) and np.array_equal(found.cells, mesh.cells)
+
+
+def _on_mesh(found: _Stored, mesh: Any) -> tuple[Array, Array, Array]:
     """The fields of a stored state on a mesh; zero where the other run has none."""
-    found, x = _read(run, time), np.asarray(mesh.nodes)
-    if found.nodes.shape[1] != x.shape[1]:
-        raise ValueError(f"initial.from: '{run}' has {found.nodes.shape[1]} dimensions; give one of {x.shape[1]}")
-    same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, mesh.cells)
+    x, same = np.asarray(mesh.nodes), _same(found, mesh)
 
     def here(values: Array | None, zero: Array) -> Array:
         if values is None or same:
@@ -58,13 +72,25 @@ def _stored(mesh: Any, run: str, time: float | None) -> tuple[Array, Array, Arra
     return here(found.u, np.zeros_like(x)), here(found.w, np.zeros_like(x)), here(found.theta, np.zeros(len(x)))
 
 
-def _refuse_jump(vectors: LoadVectors, run: str, u: Array) -> None:
+def _refuse_another_body(found: _Stored, x: Array, run: str) -> None:
+    """Raises ValueError for a body of other dimensions, another size or at another place."""
+    if found.nodes.shape[1] != x.shape[1]:
+        raise ValueError(f"initial.from: '{run}' has {found.nodes.shape[1]} dimensions; give one of {x.shape[1]}")
+    ends = [np.array([nodes.min(axis=0), nodes.max(axis=0)]) for nodes in (found.nodes, x)]
+    if np.abs(ends[0] - ends[1]).max() > SIZE * (ends[0][1] - ends[0][0]).max():
+        boxes = [" x ".join(f"[{low:.4g}, {high:.4g}]" for low, high in end.T) for end in ends]
+        raise ValueError(
+            f"initial.from: the body of '{run}' lies in {boxes[0]}, that of the scene in {boxes[1]}; give a run of the same body"
+        )
+
+
+def _refuse_jump(vectors: LoadVectors, run: str, u: Array, fits: float) -> None:
     """Raises ValueError for a displacement that the supports would change at once."""
     supports = vectors.supports
     if not len(supports.nodes):
         return
     off = np.abs(u[supports.nodes] - supports.released(u[supports.nodes]) - vectors.displacement(0.0))
-    if off.max() > FITS * max(np.abs(u).max(), 1e-300):
+    if off.max() > fits * max(np.abs(u).max(), 1e-300):
         raise ValueError(
             f"initial.from: at t = 0 the supports are up to {off.max():.3g} away from where the state in '{run}' has them; "
             "let them begin there, as in top = ['0.1 - 0.1 * t', 0.0]"

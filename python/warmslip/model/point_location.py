@@ -47,7 +47,17 @@ def cells_of(nodes: Array, cells: Any, points: Array, outside: float = 0.0) -> t
             better = least > best
             best[better] = least[better]
             cell[todo[better]], weights[todo[better]] = column[better], found[better]
-        cell[todo[best < INSIDE - (outside if many == NEAREST[-1] or many == len(cells) else 0)]] = -1
+        last = many == NEAREST[-1] or many == len(cells)
+        if last and many < len(cells):  # centroids of slender cells are far from some of their points
+            low, high = corners.min(axis=1), corners.max(axis=1)
+            for i in np.flatnonzero(best < INSIDE):
+                one = points[todo[i]]
+                for other in np.flatnonzero(((low <= one) & (one <= high)).all(axis=1)):
+                    inner = inverse[other] @ (one - corners[other, 0])
+                    found = np.concatenate([[1 - inner.sum()], inner])
+                    if found.min() > best[i]:
+                        best[i], cell[todo[i]], weights[todo[i]] = found.min(), other, found
+        cell[todo[best < INSIDE - (outside if last else 0)]] = -1
     return cell, weights
 
 

@@ -6,6 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, pairwise
 
@@ -25,8 +26,16 @@ class Block:
     size: float
 
     def time(self, n: int) -> float:
-        """The end of step n of the block, time; the last one is exactly `end`."""
-        return self.end if n == self.steps else self.begin + n * (self.end - self.begin) / self.steps
+        """The end of step n of the block, time: the number next to the exact one; 0.3 is the end of step 3 of 4 to 0.4."""
+        first, share, whole = self._exact
+        return (first + n * share) / whole
+
+    @cached_property
+    def _exact(self) -> tuple[int, int, int]:
+        """Integers with which the end of step n is (first + n share) / whole, of the times as they are written."""
+        begin, end = Fraction(repr(self.begin)), Fraction(repr(self.end))
+        common = math.lcm(begin.denominator, end.denominator)
+        return int(begin * common) * self.steps, int((end - begin) * common), common * self.steps
 
 
 @dataclass(frozen=True)

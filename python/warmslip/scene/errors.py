@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -63,10 +63,16 @@ def _sentence(error: Any, where: list[str], model: type[BaseModel]) -> str:
         case "value_error":
             message = str(error["ctx"]["error"])
             return message if key == "scene" else f"{key}: {message}"
+        case "model_type" if where[-2:-1] == ["displacement"]:
+            return f'{key} = {given}; write what each axis is held at, as in [0.0, "free"], or {{ normal = 0.0 }}'
         case "model_type":
             return f"{key} is a table, not {given}; its keys are {', '.join(_allowed(where, model))}"
         case "list_type" if isinstance(error.get("input"), dict):
             return f"{key} is a list of tables; write [[{key}]] once for each, or a list"
+        case "list_type" if where[0] == "supports" and where[-1] in ("displacement", "temperature"):
+            return f'{key} = {given} names no part; write ["top"], or {{ top = ... }}'
+        case "list_type" if isinstance(error.get("input"), int | float):
+            return f"{key} = {given} is no list; give an entry for each axis, as in [0.0, {given}]"
         case "list_type":
             return f"{key} = {given} is no list; write [{given}], with as many entries as it needs"
         case "too_short":
@@ -99,7 +105,11 @@ def _allowed(where: list[str], root: type[BaseModel]) -> list[str]:
 
 def _members(annotation: Any) -> tuple[Any, ...]:
     """The types of a union, or the type itself."""
-    return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+    if get_origin(annotation) is Annotated:
+        return _members(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return tuple(member for one in get_args(annotation) for member in _members(one))
+    return (annotation,)
 
 
 def _table(annotation: Any) -> Any:

@@ -215,8 +215,8 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
                 found = Result(answer, u, w, theta, folder / "trajectory.h5")
                 if keys := [key for key in differing(stored, scene.resolved()) if key.startswith("output.")]:
                     log.warning(
-                        "the run in '%s' is complete and stays as it is; %s would change steps that are still to come: run it "
-                        "without --resume to store others",
+                        "the run in '%s' is complete and stays as it is; %s holds for new steps alone: give a later time.end, or "
+                        "run it without --resume",
                         folder,
                         ", ".join(keys),
                     )

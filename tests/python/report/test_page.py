@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -103,6 +105,17 @@ def test_a_run_that_was_stopped_is_drawn_too(small: Small, tmp_path: Path) -> No
     message = (tmp_path / "view" / "report.html").read_text()
     assert "did not end" in message and "at t = 0.5" in message
     assert not (tmp_path / "view" / "animation.gif").exists()
+
+
+def test_the_page_has_the_warnings_of_the_run(tmp_path: Path, command: Command) -> None:
+    done = command(
+        "run", "paper_mixed", "--set", "mesh.n=4", "--set", "time.steps=2", "--set", "contact.gap=5.0", "--out", "far"
+    )
+    assert done.returncode == 0 and "warning: " in done.stderr + done.stdout
+    assert command("view", "far", "--out", "view").returncode == 0
+    (warning, *_) = json.loads((tmp_path / "far/summary.json").read_text())["warnings"]
+    page = html.unescape((tmp_path / "view/report.html").read_text())
+    assert f"warning: {warning}" in page
 
 
 def test_a_title_is_text_and_no_markup(small: Small, tmp_path: Path) -> None:

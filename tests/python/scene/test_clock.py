@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -33,7 +34,16 @@ def test_equal_steps(steps: int) -> None:
     clock = uniform(0.3, steps)
     check(clock, 0.3, steps)
     assert clock.sizes == [0.3 / steps]
-    assert clock.times == pytest.approx([n * 0.3 / steps for n in range(1, steps + 1)], abs=0)
+    assert clock.times.tolist() == [float(Fraction(3 * n, 10 * steps)) for n in range(1, steps + 1)]
+
+
+@pytest.mark.parametrize("tenths", range(1, 41))
+def test_times_are_the_numbers_next_to_the_exact_ones(tenths: int) -> None:
+    """0.3 is the end of step 3 to 0.4 as to 1: a formula with `t <= 0.3` is true there, and 0.3 is found in a trajectory."""
+    clock = uniform(tenths / 10, tenths)
+    assert clock.times.tolist() == [n / 10 for n in range(1, tenths + 1)]
+    halves = graded(tenths / 10, 2 * tenths, [tenths / 20], 0)
+    assert halves.end == tenths / 10 and tenths / 20 in halves.times.tolist()
 
 
 @pytest.mark.parametrize("to", CASES)

@@ -235,8 +235,16 @@ def test_the_paper_has_its_data() -> None:
         ({"loads.body": [0.0] * 4}, r"loads.body = .* has too many entries; give at most 3$"),
         (
             {"contact.velocity": 0.1},
-            r"contact.velocity = 0.1 is no list; write \[0.1\], with as many entries as it needs",
+            r"contact.velocity = 0.1 is no list; give an entry for each axis, as in \[0.0, 0.1\]",
         ),
+        ({"loads.body": 3}, r"loads.body = 3 is no list; give an entry for each axis, as in \[0.0, 3\]"),
+        ({"supports.displacement": 0}, r"supports.displacement = 0 names no part; write \[\"top\"\], or { top = ... }"),
+        (
+            {"supports.displacement": {"top": "free"}},
+            r"top = 'free'; write what each axis is held at, as in \[0.0, \"free\"\]",
+        ),
+        ({"supports.displacement": {"top": {"nromal": 0.0}}}, "top.nromal: unknown key; did you mean 'normal'?"),
+        ({"supports.displacement": {"top": {"normal": 0.0, "x": 1}}}, "top.x: unknown key; the keys here are normal"),
         (
             {"supports.points": {"0": {"at": [0.0, 0.0]}}},
             r"supports.points is a list of tables; write \[\[supports.points\]\]",

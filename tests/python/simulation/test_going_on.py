@@ -18,6 +18,7 @@ from support.processes import child_environment
 from support.stopped import KilledError, stop_after
 
 import warmslip
+from warmslip.scene.reader import build
 from warmslip.simulation.simulation import Simulation
 
 
@@ -293,7 +294,7 @@ def test_a_complete_run_stays_as_it_is(tmp_path: Path, caplog: pytest.LogCapture
         assert again.summary == whole.summary
         assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
     (told,) = caplog.messages
-    assert "is complete and stays as it is; output.every would change" in told
+    assert "is complete and stays as it is; output.every holds for new steps alone" in told
 
 
 def test_a_summary_that_was_lost_is_written_from_the_state(tmp_path: Path) -> None:
@@ -306,3 +307,92 @@ def test_a_summary_that_was_lost_is_written_from_the_state(tmp_path: Path) -> No
     assert one.keys() == other.keys()
     for name, value in one.items():
         np.testing.assert_allclose(other[name], value, rtol=1e-13)
+
+
+def test_a_load_that_ends_at_a_step_ends_there_in_pieces_too(tmp_path: Path) -> None:
+    """The times of a run to 0.4 and of one to 1 in steps of 0.1 are the same numbers, and formulas in t do the same."""
+
+    def pushed(end: float, steps: int) -> warmslip.Scene:
+        keys = {"time.end": end, "time.steps": steps, "loads.body": ["0", "-1*(t<=0.3)"]}
+        return scene(**keys)
+
+    whole = warmslip.run(pushed(1.0, 10), out=tmp_path / "whole")
+    warmslip.run(pushed(0.4, 4), out=tmp_path / "pieces")
+    end = warmslip.run(pushed(1.0, 10), out=tmp_path / "pieces", resume=True)
+    assert np.array_equal(whole.u, end.u)
+    with warmslip.Trajectory(end.trajectory) as stored:
+        assert np.asarray(stored.time).tolist() == [n / 10 for n in range(11)]
+
+
+def test_states_that_are_stored_stay_whatever_the_new_cadence(tmp_path: Path) -> None:
+    warmslip.run(scene(0.5, 8, **{"output.every": 3}), out=tmp_path)
+    end = warmslip.run(scene(1.0, 16, **{"output.every": 5}), out=tmp_path, resume=True)
+    with warmslip.Trajectory(end.trajectory) as stored:
+        assert (np.asarray(stored.time) * 16).tolist() == [0, 3, 6, 10, 15, 16]
+    with pytest.raises(KilledError):
+        warmslip.run(scene(1.0, 16, **{"output.every": 2}), out=tmp_path / "killed", progress=stop_after(7))
+    end = warmslip.run(scene(1.0, 16, **{"output.every": 5}), out=tmp_path / "killed", resume=True)
+    with warmslip.Trajectory(end.trajectory) as stored:
+        assert (np.asarray(stored.time) * 16).tolist() == [0, 2, 4, 6, 10, 15, 16]
+
+
+READER = """
+import sys, warmslip
+with warmslip.Trajectory(sys.argv[1]) as stored:
+    print(float(stored.time[-1]), flush=True)
+    sys.stdin.readline()
+    print(float(stored.time[-1]), float(abs(stored.u[-1]).max()), flush=True)
+"""
+
+
+def test_a_trajectory_that_another_program_reads_stays_whole_there(tmp_path: Path) -> None:
+    first = warmslip.run(scene(), out=tmp_path)
+    assert first.trajectory is not None
+    reader = subprocess.Popen(
+        [sys.executable, "-c", READER, str(first.trajectory)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=child_environment(),
+        text=True,
+    )
+    assert reader.stdout is not None and reader.stdout.readline() == "0.5\n"
+    warmslip.run(scene(1.0, 4), out=tmp_path)
+    found, _ = reader.communicate("\n", timeout=60)
+    assert found == f"0.5 {float(np.abs(first.u).max())!r}\n"
+
+
+def test_a_state_of_another_body_is_refused(tmp_path: Path) -> None:
+    run = warmslip.run(scene(**{"mesh.lengths": [1.0, 1.0]}), out=tmp_path)
+    for lengths in ([1.1, 1.0], [0.5, 1.0], [1.0, 1.05]):
+        other = scene(**{"mesh.lengths": lengths, "mesh.n": 9, "initial.from": str(run.trajectory)})
+        with pytest.raises(ValueError, match=r"initial.from: the body of .* lies in \[0, 1\] x \[0, 1\]"):
+            warmslip.run(other)
+
+
+def test_a_temperature_that_another_run_does_not_have_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    still = {
+        "mesh": {"n": 4},
+        "time": {"steps": 1},
+        "elasticity": {"lame": [1.0, 1.0]},
+        "supports": {"displacement": ["top"]},
+    }
+    run = warmslip.run(build(still), out=tmp_path)
+    warmslip.run(build(still | {"heat": {"conductivity": 1.0}, "initial": {"from": str(run.trajectory)}}))
+    (told,) = caplog.messages
+    assert "has no temperature; it is taken as 0 at the start" in told
+
+
+def test_supports_whose_shape_no_coarse_mesh_has(tmp_path: Path) -> None:
+    """A state between meshes fits its supports to the error of interpolation."""
+    bent = {
+        "supports.displacement": {"top": ["0.01 * sin(pi * x)", 0.0]},
+        "initial.displacement": ["0.01 * sin(pi * x) * y", "0"],
+    }
+    run = warmslip.run(scene(**bent), out=tmp_path)
+    finer = scene(
+        **{"supports.displacement": bent["supports.displacement"], "mesh.n": 15, "initial.from": str(run.trajectory)}
+    )
+    assert warmslip.run(finer).completed
+    away = finer.override(**{"supports.displacement": {"top": ["0.02 * sin(pi * x)", 0.0]}})
+    with pytest.raises(ValueError, match="let them begin there"):
+        warmslip.run(away)
