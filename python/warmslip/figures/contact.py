@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from warmslip.figures.style import BLUE, GREY, INK, SKY, VERMILLION, number
+from warmslip.messages import quoted
 from warmslip.typing import Array
 
 STATUS = (("open", "#d9d9d9"), ("stick", SKY), ("slip", VERMILLION))
@@ -53,10 +54,22 @@ class ContactLine:
 def nearest(line: ContactLine, times: Any, count: int = 4) -> list[int]:
     """The steps nearest to times; for None some of those in which the part touches, evenly spread."""
     if times is not None:
-        return sorted({int(np.abs(line.time - time).argmin()) for time in times})
+        return _nearest(line.time, times)
     touching = np.flatnonzero((np.asarray(line.status) > 0).any(axis=1))
     among = touching if len(touching) else np.arange(len(line.time))
     return sorted({int(among[i]) for i in np.linspace(0, len(among) - 1, count + 1).round().astype(int)[1:]})
+
+
+def _nearest(known: Array, times: Any) -> list[int]:
+    """The numbers of the known times that are nearest to one or several. Raises ValueError for none, and for others."""
+    try:
+        wanted = np.atleast_1d(np.asarray(times, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError(f"times = {quoted(times)}; give a time or a list of times") from None
+    slack = 1e-9 * abs(known[-1])
+    if not len(wanted) or not ((wanted >= -slack) & (wanted <= known[-1] + slack)).all():
+        raise ValueError(f"times = {quoted(times)}; give times from 0 to {known[-1]:g}")
+    return sorted({int(np.abs(known - time).argmin()) for time in wanted})
 
 
 def _shades(count: int) -> list[Any]:
@@ -155,7 +168,7 @@ def temperature_on(ax: Any, line: ContactLine, times: Any = None) -> str:
     if times is None:
         chosen = [int(i) for i in np.linspace(0, len(stored) - 1, 5).round()[1:]]
     else:
-        chosen = [int(np.abs(line.time[stored] - time).argmin()) for time in times]
+        chosen = _nearest(line.time[stored], times)
     steps = sorted({int(stored[i]) for i in chosen})
     for step, colour in zip(steps, _shades(len(steps)), strict=True):
         _curve(ax, line.arc_length, line.temperature[step], color=colour, label=f"t = {number(line.time[step])}")

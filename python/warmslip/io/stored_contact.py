@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from warmslip.messages import quoted
 from warmslip.model.contact_output import ContactFields, PartPoints, chosen_part, contact_fields_on
 from warmslip.model.loads import data, evaluate
 from warmslip.model.materials import contact_part
@@ -44,6 +46,8 @@ class StoredContact:
     def near(self, part: str | None, time: float | None) -> ContactFields:
         """The fields in the step nearest to a time, in the last one for None. Raises ValueError."""
         last = self._last()
+        if time is not None and (isinstance(time, str | bool) or not isinstance(time, Real)):
+            raise ValueError(f"time = {quoted(time)} is no number; give a time, or leave it out for the last step")
         if time is not None and not 0 <= time <= last * (1 + SAME_TIME):
             raise ValueError(f"the run has steps to t = {last:g}, not at {time:g}")
         step = len(self._times) - 1 if time is None else int(np.abs(self._times - time).argmin())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
@@ -84,6 +85,8 @@ def state_number(times: Array, time: float | None) -> int:
     """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
     if time is None:
         return len(times) - 1
+    if isinstance(time, str | bool) or not isinstance(time, Real):
+        raise ValueError(f"time = {quoted(time)} is no number; give a time, or leave it out for the last state")
     if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
         raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
     return int(np.abs(times - time).argmin())
@@ -281,7 +284,11 @@ class Trajectory(Shown):
         return list(json.loads(self._read.attrs.get("functions", "[]")))
 
     def series(self, group: str) -> dict[str, Array]:
-        """Every dataset of `steps`, `balances`, `contact`, `reactions` or `heat_flows` as arrays."""
+        """Every dataset of `steps`, `balances`, `contact`, `reactions` or `heat_flows` as arrays. Raises ValueError."""
+        if not isinstance(self._read.get(group), h5py.Group):
+            raise ValueError(
+                f"the trajectory has no series {quoted(group)}; give steps, balances, contact, reactions or heat_flows"
+            )
         fixed = ("positions", "normals", "weights", "part") if group == "contact" else ()
         return {
             name: np.asarray(data if name in fixed else data[: self._steps]) for name, data in self._read[group].items()

@@ -36,6 +36,17 @@ def _closed() -> Iterator[None]:
 
 
 def test_pressure_and_traction_with_its_bound(result: Result) -> None:
+    assert len(result.plot.contact(times=0.5)[0].lines) == len(result.plot.contact(times=[0.5])[0].lines)
+    for wrong in ([], [9.0], [-3.0], "x", [None]):
+        for draw in (result.plot.contact, result.plot.temperature):
+            with pytest.raises(ValueError, match=r"times = .*; give (times from 0 to 1|a time or a list of times)"):
+                draw(times=wrong)
+    with warmslip.Trajectory(result.trajectory) as stored:
+        for ask in (stored.state, stored.contact_on):
+            with pytest.raises(ValueError, match="time = 'end' is no number; give a time"):
+                ask(time="end")
+        with pytest.raises(ValueError, match="has no series 'stepz'; give steps, balances"):
+            stored.series("stepz")
     upper, lower = result.plot.contact(times=[0.5, 1.0])
     with warmslip.Trajectory(str(result.trajectory)) as stored:
         seen = [stored.contact_on(time=time) for time in (0.5, 1.0)]
