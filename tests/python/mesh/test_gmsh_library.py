@@ -125,3 +125,21 @@ def test_a_file_cut_anywhere_is_refused(tmp_path: Path) -> None:
             with pytest.raises(ValueError, match=r"is missing; save the mesh again|it holds no cells"):
                 files.read(str(path))
             files._read.cache_clear()
+
+
+def test_a_file_of_one_partition_alone_is_refused(tmp_path: Path) -> None:
+    gmsh.clear()
+    gmsh_corpus.partitioned()
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+    gmsh.option.setNumber("Mesh.PartitionSplitMeshFiles", 1)
+    try:
+        gmsh.write(str(tmp_path / "plate.msh"))
+    finally:
+        gmsh.option.setNumber("Mesh.PartitionSplitMeshFiles", 0)
+    found = sorted(tmp_path.glob("plate_*.msh"))
+    assert len(found) == 3
+    for number, path in enumerate(found, 1):
+        with pytest.raises(
+            ValueError, match=rf"the file holds partition {number} of 3 alone; save the mesh in one file"
+        ):
+            files.read(str(path))
