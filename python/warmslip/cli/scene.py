@@ -117,7 +117,7 @@ def _tell_error(result: Any, answer: Any, wanted: Any, out: Path, rank: int) -> 
     if rank == 0:
         with_error(result, answer, wanted, out)
         parts = "; ".join(
-            f"{name} {100 * sum(one.values()):.2g} % (mesh {100 * one['space']:.2g} %, steps {100 * one['time']:.2g} %)"
+            f"{name} {100 * answer.errors[name]:.2g} % (mesh {100 * one['space']:.2g} %, steps {100 * one['time']:.2g} %)"
             for name, one in answer.parts.items()
         )
         typer.echo(

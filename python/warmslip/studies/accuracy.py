@@ -132,6 +132,7 @@ def with_error(found: Result, answer: ask.Answer, asked: float, folder: Path | N
         "estimated": answer.error,
         "of": answer.plan.quantities,
         "parts": answer.parts,
+        "errors": answer.errors,
         "setting": pilots.keys_of(answer.scene),
         "predicted": answer.tries[-1].error,
         "tries": len(answer.tries),

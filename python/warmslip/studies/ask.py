@@ -169,6 +169,8 @@ class Answer:
         Its estimated relative error, the largest of the quantities, dimensionless.
     parts : dict
         Relative errors from space and time by quantity.
+    errors : dict
+        What they come to together, by quantity.
     plan : Plan
         How it was chosen.
     tries : list of Choice
@@ -181,6 +183,7 @@ class Answer:
     simulation: Simulation
     error: float
     parts: dict[str, dict[str, float]]
+    errors: dict[str, float]
     plan: Plan
     tries: list[Choice]
     seconds: float
@@ -211,7 +214,8 @@ def solve(
         parts = {name: _parts(pilots, setting, name, [*space[:1], time], size[name]) for name in found.quantities}
         for name in found.quantities if halved else []:
             pilots.learn_power(name, *(one.values[name] for one in (space[0], time, space[1])))
-        estimated = max(together(one["space"], one["time"], pilots.power[name]) for name, one in parts.items())
+        errors = {name: together(one["space"], one["time"], pilots.power[name]) for name, one in parts.items()}
+        estimated = max(errors.values())
         if estimated <= error or len(tries) == TRIES:
             break
         choice = _next(pilots, choice, parts, error, seconds)
@@ -223,7 +227,7 @@ def solve(
             f"an error of {100 * error:.3g} % was not reached: {describe(choice)} has {100 * estimated:.2g} %; ask for that, or "
             "allow more"
         )
-    return Answer(choice.scene, runs[0].simulation, estimated, parts, found, tries, spent)
+    return Answer(choice.scene, runs[0].simulation, estimated, parts, errors, found, tries, spent)
 
 
 def _parts(pilots: Pilots, setting: Setting, name: str, found: list[Distance], size: float) -> dict[str, float]:

@@ -231,7 +231,9 @@ def test_run_takes_an_error(tmp_path: Path) -> None:
     answer = warmslip.run(scene, error=0.05, of="theta_L2")
     known = answer.summary["error"]
     assert known["estimated"] <= known["asked"] == 0.05
-    assert known["parts"].keys() == {"theta_L2"}
+    assert known["parts"].keys() == known["errors"].keys() == {"theta_L2"}
+    (together,), (parts,) = known["errors"].values(), known["parts"].values()
+    assert together == known["estimated"] and max(parts.values()) <= together <= sum(parts.values()) * (1 + 1e-12)
     stored = warmslip.run(scene, error=0.05, of="theta_L2", out=tmp_path)
     assert json.loads((tmp_path / "summary.json").read_text())["error"]["setting"] == known["setting"]
     assert stored.theta.shape == answer.theta.shape
