@@ -286,14 +286,19 @@ def explain(
 
         found = cost.measured(checked)
     else:
+        from warmslip.model.initial import refuse_unusable
+        from warmslip.model.loads import Loads
         from warmslip.model.materials import cell_regions
         from warmslip.model.meshes import make_mesh
         from warmslip.model.probes import refuse_outside
+        from warmslip.model.supports import supports
 
         found = plan.plan(checked)
         mesh = make_mesh(checked)
         cell_regions(checked, mesh)  # what else a run would refuse
         refuse_outside(checked, mesh)
+        refuse_unusable(checked, mesh)
+        supports(checked, Loads.of(checked), mesh)
     if MPI.COMM_WORLD.rank == 0:
         typer.echo(plan.text(found))
         if draw is not None:

@@ -56,6 +56,12 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
     return start("displacement", d), start("velocity", d), start("temperature", 1)[:, 0]
 
 
+def refuse_unusable(scene: Scene, mesh: Any) -> None:
+    """Raises ValueError where the run that a scene begins with cannot be read, or is of another body."""
+    if scene.initial.run is not None:
+        _refuse_another_body(_read(scene.initial.run, scene.initial.time), np.asarray(mesh.nodes), scene.initial.run)
+
+
 def _same(found: _Stored, mesh: Any) -> bool:
     return np.array_equal(found.nodes, np.asarray(mesh.nodes)) and np.array_equal(found.cells, mesh.cells)
 

@@ -163,6 +163,19 @@ def test_a_study_of_ones_own(command: Command, tmp_path: Path) -> None:
     assert slow.returncode == 2 and "--steps-per-level 0 is no number of steps" in slow.stderr
 
 
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("initial.from=none.h5", "initial.from: 'none.h5' is no file; give the trajectory.h5 of a run"),
+        ("supports.points=[{at=[5,5]}]", "supports.points.0: the nearest node of (5, 5) is"),
+    ],
+)
+def test_a_dry_run_refuses_what_a_run_refuses(command: Command, key: str, words: str) -> None:
+    for how in ((), ("--dry-run",)):
+        done = command("run", "paper_mixed", "--set", "mesh.n=4", "--set", key, *how)
+        assert done.returncode == 2 and words in done.stderr
+
+
 def test_what_is_odd_is_said_before_a_run(command: Command) -> None:
     small = [word for key in ("mesh.n=4", "time.steps=2") for word in ("--set", key)]
     done = command("run", "paper_mixed", *small, "--set", "contact.gap=-0.01")
