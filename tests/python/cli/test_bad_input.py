@@ -114,6 +114,17 @@ def test_a_reader_that_has_seen_enough_ends_a_command(words: str, tmp_path: Path
     assert (tmp_path / "run/summary.json").exists() == words.startswith("run")
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder in which nobody can make files")
+def test_a_folder_in_which_nothing_can_be_made(command: Command) -> None:
+    for words in (
+        "run heat_slab --set time.steps=1 --out /proc/run",
+        "run heat_slab --set time.steps=1 --out /proc/self",
+    ):
+        done = command(*words.split())
+        assert done.returncode == 2 and done.stderr.count("error:") == 1 and "/proc/" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
 def test_a_program_whose_output_nobody_reads_gets_the_error_of_python(tmp_path: Path) -> None:
     program = (
         "import warmslip\nwarmslip.run(warmslip.load('heat_slab').override(**{'time.steps': 1}))\nprint(1, flush=True)"
