@@ -202,8 +202,8 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           free_,
           loads.foundation,
           drive_,
-          1e-5 * extents_.motion,
-          loads.support_velocity};
+          loads.support_velocity,
+          1e-5 * extents_.motion};
 }
 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.

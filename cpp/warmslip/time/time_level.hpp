@@ -58,8 +58,9 @@ struct StepInputs {
   Eigen::VectorXd contact_free;       ///< velocity without contact, as below, for the size of its terms
   Eigen::VectorXd foundation;         ///< theta_F at the points, where the conductance depends on the pressure
   Eigen::VectorXd drive;              ///< tangential velocity of the foundation, to which slip is relative, (d points)
-  Eigen::Vector3d least_motion;       ///< of the contact points, by axis, which rounding of earlier ones may make
   Vec support_velocity;               ///< of the held directions, null where all are at rest
+  /// Of the contact points, by axis: a displacement that the rounding of earlier ones may make.
+  Eigen::Vector3d least_motion = Eigen::Vector3d::Zero();
 };
 
 }  // namespace warmslip
