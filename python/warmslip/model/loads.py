@@ -98,8 +98,8 @@ class Loads:
 
     def __post_init__(self) -> None:
         """Raises TypeError for a load that is not by part where it should be, and for a formula."""
-        if isinstance(self.points, bool) or not isinstance(self.points, int) or not 1 <= self.points <= 8:
-            raise TypeError(f"loads.points: {quoted(self.points)}; give a whole number from 1 to 8")
+        if isinstance(self.points, bool) or not isinstance(self.points, int) or self.points < 1:
+            raise TypeError(f"loads.points: {quoted(self.points)}; give a whole number, at least 1")
         for name in ("traction", "heat_flux", "displacement", "temperature"):
             if not isinstance(value := getattr(self, name), dict):
                 raise TypeError(f"loads.{name}: {quoted(value)} is no dictionary; give it by part, {{'left': ...}}")

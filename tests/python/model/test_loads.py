@@ -125,3 +125,9 @@ def test_loads_that_no_field_takes_are_refused(without: str, given: dict[str, An
     }[without]
     with pytest.raises(ValueError, match=rf"loads\.{next(iter(given))}: the scene has no \[.* nothing would take it"):
         warmslip.run(scene, loads=replace(warmslip.Loads.of(scene), **given))
+
+
+@pytest.mark.parametrize("points", [0, -1, 2.5, True, "3"])
+def test_points_are_a_whole_number(points: Any) -> None:
+    with pytest.raises(TypeError, match=r"loads.points: .*; give a whole number, at least 1"):
+        warmslip.Loads(points=points)
