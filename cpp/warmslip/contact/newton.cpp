@@ -340,6 +340,7 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
         at.points[static_cast<std::size_t>(row / d)].by_velocity * change.template segment<d>(row);
   at.value.tail(rigid_.count()) = -problem.rigid;
   const Eigen::VectorXd response = direction(at);
+  if (!resting.empty()) clear_cache();  // no later step is to find a tangent of statuses that were supposed
   if (!response.allFinite() || solution.unsupported) return false;
   solution.added = response.head(all);
   solution.force = problem.known_force + solution.added;
