@@ -1,4 +1,4 @@
-"""Scenes of which there is nothing to say, to be changed until there is."""
+"""Scenes of which there is nothing to say, to be changed until there is; and one whose coupling feeds it."""
 
 from __future__ import annotations
 
@@ -38,6 +38,23 @@ KELVIN = {
     "initial": {"temperature": 293.0},
     "supports": {"temperature": {"top": 300.0}, "displacement": ["top"]},
     "contact": None,
+}
+
+STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
+# a column, as in test_coupling_limit, in steps of 0.54 where 0.533 is the longest that staggered ones stand
+COUPLED: dict[str, Any] = {
+    "mesh": {"shape": "square", "n": 4},
+    "time": {"end": 162.0, "steps": 300},
+    "elasticity": {"lame": [0.0, 0.75]},
+    "viscosity": {"lame": [0.0, 1.0]},
+    "heat": {
+        "conductivity": 1e-6,
+        "capacity": 1.0,
+        "expansion": STRETCHED,
+        "heating": {"tensor": [[0.0, 0.0], [0.0, -3.0]]},
+    },
+    "supports": {"displacement": ["top"]},
+    "initial": {"temperature": 1e-5},
 }
 
 

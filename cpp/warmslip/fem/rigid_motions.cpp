@@ -183,13 +183,13 @@ void RigidMotions::prepare(Factor& factor, const Apply& mass) {
   respond([&](Vec r, Vec x) { factor.solve(r, x); }, mass, inner_, along_);
   if (!factor.symmetric())
     respond([&](Vec r, Vec x) { factor.solve_transposed(r, x); }, mass, inner_transposed_, along_transposed_);
-  weigh(along_, mass);
+  find_inertia(along_, mass);
 }
 
-void RigidMotions::prepare(const Apply& mass) { weigh(motions_, mass); }
+void RigidMotions::prepare(const Apply& mass) { find_inertia(motions_, mass); }
 
 // H from W, or from the motions themselves.
-void RigidMotions::weigh(const std::vector<VecHandle>& along, const Apply& mass) {
+void RigidMotions::find_inertia(const std::vector<VecHandle>& along, const Apply& mass) {
   inertia_.resize(count(), count());
   if (empty()) return;
   const VecHandle right = duplicate(motions_.front());

@@ -84,7 +84,7 @@ class RigidMotions {
   using Solve = std::function<void(Vec, Vec)>;
   Eigen::VectorXd dots(const std::vector<VecHandle>& with, Vec x) const;
   void combine(const std::vector<VecHandle>& of, const Eigen::VectorXd& by, Vec x) const;
-  void weigh(const std::vector<VecHandle>& along, const Apply& mass);
+  void find_inertia(const std::vector<VecHandle>& along, const Apply& mass);
   void respond(const Solve& solve, const Apply& mass, std::vector<VecHandle>& inner, std::vector<VecHandle>& along);
 
   VecHandle right_;                                             // a vector of the operator

@@ -32,8 +32,7 @@ FrictionBound Friction::bound(double pressure, double slip_speed) const {
     const auto [value, by_pressure, by_speed] = custom(pressure, slip_speed);
     return {value, by_pressure, by_speed};
   }
-  const double fall = speed > 0 ? (coefficient - kinetic) * std::exp(-slip_speed / speed) : 0;
-  const double mu = speed > 0 ? kinetic + fall : coefficient;
+  const double mu = at(slip_speed), fall = mu - kinetic;
   const double value = cohesion + mu * pressure;
   if (value >= limit) return {limit, 0, 0};
   return {value, mu, speed > 0 ? -fall / speed * pressure : 0};

@@ -136,7 +136,7 @@ void Stepper<d>::coupled_heat_defect(const StepInputs& inputs, bool with_roundin
 // The balances of a solved step. The temperature of every part of a monolithic one that conducts far more than it
 // stores is first shifted by a constant, so that the part has all of its heat.
 template <int d>
-Balances Stepper<d>::weigh(const StepLoads& loads, const ContactSolution<d>& contact) {
+Balances Stepper<d>::balances_of(const StepLoads& loads, const ContactSolution<d>& contact) {
   const StepInputs inputs = complete(loads, contact);
   const Balances balances = balance(inputs);
   if (!monolithic() || systems_->constants.empty()) return balances;
@@ -308,7 +308,7 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   double warmer = Errors::unknown;
   const bool creeps = systems_->contact && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
   if (creeps && correct_motion(loads, balances, contact, true)) {
-    balances = weigh(loads, contact);
+    balances = balances_of(loads, contact);
     ++cost_.refinements;
     errors_ = {};
     for (Extent* field : extents_.all()) field->tried = 0;
@@ -318,12 +318,12 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
     const Motion before = motion_of(contact);
     const bool was_closed = closed(balances);
     if (!correct_motion(loads, balances, contact, true)) break;
-    balances = weigh(loads, contact);
+    balances = balances_of(loads, contact);
     ++cost_.refinements;
     refined = true;
     if (was_closed && !closed(balances)) {  // it did harm
       undo(before, contact);
-      balances = weigh(loads, contact);
+      balances = balances_of(loads, contact);
       break;
     }
     if (!(motion() < 0.5 * rest) && !(errors_.largest() < 0.5 * error)) break;

@@ -272,7 +272,7 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     if (finite) report.balances.law_residual = contact.law_residual;
     return report;
   }
-  StepReport<d> report = conclude(loads, refine(loads, weigh(loads, contact), contact), contact);
+  StepReport<d> report = conclude(loads, refine(loads, balances_of(loads, contact), contact), contact);
   if (report.outcome != Outcome::completed) {
     extents_ = extents_before;  // what was not taken counts in no later step
     return report;

@@ -210,7 +210,7 @@ class Stepper {
   Eigen::VectorXd sliding(Vec w) const;
   void note_temperature(const Balances& balances);
   void coupled_heat_defect(const StepInputs& inputs, bool with_rounding);
-  Balances weigh(const StepLoads& loads, const ContactSolution<d>& contact);
+  Balances balances_of(const StepLoads& loads, const ContactSolution<d>& contact);
   void add_heat_of_error(const StepLoads& loads);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;

@@ -18,6 +18,12 @@ from warmslip.typing import Array
 SAME_TIME = 1e-9  # relative to the end of the run
 
 
+def refuse_no_time(time: Any) -> None:
+    """Raises ValueError for what is neither a number nor None, the last time."""
+    if time is not None and (isinstance(time, bool) or not isinstance(time, Real)):
+        raise ValueError(f"time = {quoted(time)} is no number; give a time, or leave it out for the last one")
+
+
 class StoredContact:
     """The group `contact` of a trajectory: of `steps` steps, whose first `states` states are whole.
 
@@ -46,8 +52,7 @@ class StoredContact:
     def near(self, part: str | None, time: float | None) -> ContactFields:
         """The fields in the step nearest to a time, in the last one for None. Raises ValueError."""
         last = self._last()
-        if time is not None and (isinstance(time, str | bool) or not isinstance(time, Real)):
-            raise ValueError(f"time = {quoted(time)} is no number; give a time, or leave it out for the last step")
+        refuse_no_time(time)
         if time is not None and not 0 <= time <= last * (1 + SAME_TIME):
             raise ValueError(f"the run has steps to t = {last:g}, not at {time:g}")
         step = len(self._times) - 1 if time is None else int(np.abs(self._times - time).argmin())

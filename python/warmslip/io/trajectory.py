@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import tempfile
 from functools import cached_property
-from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,7 +12,7 @@ import h5py
 import numpy as np
 
 from warmslip.io import part_series
-from warmslip.io.stored_contact import StoredContact
+from warmslip.io.stored_contact import StoredContact, refuse_no_time
 from warmslip.io.stored_state import StoredState
 from warmslip.io.trajectory_writer import BALANCES, REPORT, step_numbers
 from warmslip.mesh import files
@@ -83,10 +82,9 @@ def _shape(file: h5py.File, name: str, kind: str, *shape: int | None) -> tuple[i
 
 def state_number(times: Array, time: float | None) -> int:
     """The stored state nearest to a time, the last one for None. Raises ValueError for a time beyond the run."""
+    refuse_no_time(time)
     if time is None:
         return len(times) - 1
-    if isinstance(time, str | bool) or not isinstance(time, Real):
-        raise ValueError(f"time = {quoted(time)} is no number; give a time, or leave it out for the last state")
     if not times[0] - 1e-9 <= time <= times[-1] * (1 + 1e-9):
         raise ValueError(f"the run has states from t = {times[0]:g} to {times[-1]:g}, not at {time:g}")
     return int(np.abs(times - time).argmin())

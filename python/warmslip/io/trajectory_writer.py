@@ -168,7 +168,7 @@ class TrajectoryWriter:
         with h5py.File(earlier, "r", libver="latest", swmr=True) as file:
             reached = step_numbers(np.asarray(file["states/time"]), np.asarray(file["steps/time"]))
             # the last one of a run that was stopped, which no cadence asked for, goes
-            stopped = reached[-1] % (json.loads(file.attrs["scene"])["output"] or {}).get("every", 1)
+            stopped = reached[-1] % json.loads(file.attrs["scene"])["output"]["every"]
             due = np.flatnonzero((reached <= keep) & ((reached < reached[-1]) | (stopped == 0)))
             self._stored = int(reached[due][-1]) if len(due) else -1
             for name in self._file["states"]:

@@ -45,8 +45,9 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
         ):
             if needed and there is None:
                 log.warning("initial.from: the run in '%s' has no %s; it is taken as 0 at the start", initial.run, name)
-        u, w, theta = _on_mesh(found, mesh)
-        _refuse_jump(vectors, initial.run, u, FITS if _same(found, mesh) else BETWEEN)
+        same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, mesh.cells)
+        u, w, theta = _on_mesh(found, x, same)
+        _refuse_jump(vectors, initial.run, u, FITS if same else BETWEEN)
         return u, w, theta
 
     def start(name: str, components: int) -> Array:
@@ -62,13 +63,8 @@ def refuse_unusable(scene: Scene, mesh: Any) -> None:
         _refuse_another_body(_read(scene.initial.run, scene.initial.time), np.asarray(mesh.nodes), scene.initial.run)
 
 
-def _same(found: _Stored, mesh: Any) -> bool:
-    return np.array_equal(found.nodes, np.asarray(mesh.nodes)) and np.array_equal(found.cells, mesh.cells)
-
-
-def _on_mesh(found: _Stored, mesh: Any) -> tuple[Array, Array, Array]:
-    """The fields of a stored state on a mesh; zero where the other run has none."""
-    x, same = np.asarray(mesh.nodes), _same(found, mesh)
+def _on_mesh(found: _Stored, x: Array, same: bool) -> tuple[Array, Array, Array]:
+    """The fields of a stored state at the nodes x, of the same mesh or another; zero where the other run has none."""
 
     def here(values: Array | None, zero: Array) -> Array:
         if values is None or same:

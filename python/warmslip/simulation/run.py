@@ -206,13 +206,12 @@ def _ended(simulation: Simulation, folder: Path) -> Result | None:
         try:
             scene, answer = simulation.scene, json.loads((folder / "summary.json").read_text(encoding="utf-8"))
             with Trajectory(folder / "trajectory.h5") as t:
-                u, w, theta = (None if one is None else np.asarray(one[-1]) for one in (t.u, t.w, t.theta))
                 end, stored = float(t.time[-1]), t.scene
             told = {name: stored.get(name) for name in ("output", "title")}  # they change no step
             stamp, digest = answer["stamp"], scene.override(**told).digest()
             same = (stamp["scene_hash"], stamp["fingerprint"]) == (digest, provenance.fingerprint())
             if answer["outcome"] == "completed" and same and not answer["functions"] and end == scene.time.end:
-                found = Result(answer, u, w, theta, folder / "trajectory.h5")
+                found = Result.read(folder)
                 if keys := [key for key in differing(stored, scene.resolved()) if key.startswith("output.")]:
                     log.warning(
                         "the run in '%s' is complete and stays as it is; %s holds for new steps alone: give a later time.end, or "

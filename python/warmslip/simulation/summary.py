@@ -22,7 +22,6 @@ def summary(simulation: Simulation) -> dict[str, Any]:
     """Outcome, norms, contact, balances, cost and stamp of a run as it stands (collective)."""
     s, d, report = simulation.stepper, simulation.discretisation, simulation.report
     norms, cost, statistics = d.norms, s.cost, simulation.statistics
-    contact, counts, traction = _contact(simulation)
     counters = {name: getattr(cost, name) for name in type(cost).items}
     force = np.reshape(s.contact_force, (1, -1, d.dim))
     parts = {name: float(values[0]) for name, values in resultants(d, force).items()}
@@ -41,7 +40,7 @@ def summary(simulation: Simulation) -> dict[str, Any]:
         "norms": ({"u_V": norms.v(s.u), "u_L2": norms.l2(s.u), "w_L2": norms.l2(s.w)} if s.u is not None else {})
         | ({"theta_L2": norms.l2(s.theta)} if s.theta is not None else {}),
         "largest": largest_values(d, s),
-        "contact": contact | counts | {"traction": traction, "parts": parts},
+        "contact": _contact(simulation, parts),
         **by_part,
         "balances": statistics.residuals,
         "digits": digits(statistics.trusted(s.extents)),
@@ -65,28 +64,21 @@ def summary(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-def _contact(simulation: Simulation) -> tuple[dict[str, float], dict[str, int], list[float]]:
-    """Resultants and the largest penetration, points by status, and the force on the body, of the last step."""
-    s, d, report = simulation.stepper, simulation.discretisation, simulation.report
-    if report is not None:
-        contact = {
-            "normal_force": report.normal_force,
-            "tangential_force": float(np.linalg.norm(report.friction_traction)),
-            "max_penetration": report.max_penetration,
-        }
-        return contact, {name: getattr(report, name) for name in STATUSES}, list(report.traction)
-    # no step was taken in this process: what the state says
+def _contact(simulation: Simulation, parts: dict[str, float]) -> dict[str, Any]:
+    """Resultants, the largest penetration, points by status and the force on the body, of the state as it stands."""
+    s, d = simulation.stepper, simulation.discretisation
     force, status = np.reshape(s.contact_force, (-1, d.dim)), np.asarray(s.status, dtype=int)
-    normals = np.asarray(d.surface.normals).reshape(-1, d.dim)
+    normals = np.reshape(d.surface.normals, (-1, d.dim))
     pressing = np.sum(force * normals, axis=1)
-    gap = State(d, s, simulation.taken).contact["gap"] if simulation.taken and len(force) else np.zeros(1)
-    contact = {
-        "normal_force": float(pressing.sum()),
+    depth = -State(d, s, simulation.taken).contact["gap"] if simulation.taken and len(force) else np.zeros(1)
+    return {
+        "normal_force": sum(pressing.tolist(), 0.0),  # one by one, as in the report of a step
         "tangential_force": float(np.linalg.norm((force - pressing[:, None] * normals).sum(axis=0))),
-        "max_penetration": max(0.0, float(-gap.min())),
+        "max_penetration": max(0.0, float(depth.max())),
+        **{name: int(np.sum(status == number)) for number, name in enumerate(STATUSES)},
+        "traction": (0.0 - force.sum(axis=0)).tolist(),
+        "parts": parts,
     }
-    counts = {name: int(np.sum(status == number)) for number, name in enumerate(STATUSES)}
-    return contact, counts, [0.0 if one == 0 else -float(one) for one in force.sum(axis=0)]
 
 
 def numbers(summary: dict[str, Any]) -> dict[str, str]:

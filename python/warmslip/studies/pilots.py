@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from warmslip.mesh import files
 from warmslip.model.discretisation import Discretisation, discretise
@@ -51,6 +50,8 @@ def together(space: float, time: float, power: float) -> float:
 
 def power_of(space: float, time: float, both: float) -> float:
     """The power in [1, 2] with which two parts make what they make together."""
+    from scipy.optimize import brentq  # a quarter of a second, for few runs
+
     if both >= space + time:
         return 1.0
     if both <= together(space, time, 2.0):

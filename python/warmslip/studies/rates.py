@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq
 
 from warmslip.records import tables
 from warmslip.records.tables import Row
@@ -31,6 +30,8 @@ def corrected(coarse: float, fine: float, h: float, reference: float, *, quadrat
     errors are orthogonal, so a plain ratio flatters: a true first order shows 1.58 at the last halving of 1/16 .. 1/128
     against 1/256. `h` belongs to `coarse`, h/ratio to `fine`. nan when no p in (0.02, 8) fits.
     """
+    from scipy.optimize import brentq  # a quarter of a second, for few commands
+
     if not (coarse > 0 and fine > 0):  # of a field that is not there
         return float("nan")
     r = h / reference
@@ -63,6 +64,8 @@ def williams_exponent(lam: float, mu: float, angle: float = np.pi / 2) -> float:
 
     M. L. Williams, J. Appl. Mech. 19, 1952: sin^2(L angle) = (c+1)^2/(4c) - L^2 sin^2(angle)/c, c = (lam+3mu)/(lam+mu).
     """
+    from scipy.optimize import brentq
+
     c = (lam + 3 * mu) / (lam + mu)
 
     def equation(exponent: float) -> float:

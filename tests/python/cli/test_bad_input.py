@@ -95,23 +95,29 @@ def test_one_sentence_and_exit_code_2(arguments: list[str], words: str, command:
     assert words in done.stderr
 
 
-@pytest.mark.parametrize("words", ["list", "explain paper_mixed", "run heat_slab --set time.steps=2 --out run"])
-def test_a_reader_that_has_seen_enough_ends_a_command(words: str, tmp_path: Path) -> None:
-    """Into a pipe that nobody reads: no traceback, no banner, exit code 1, and the files of a run."""
-    program = Path(sys.executable).parent / "warmslip"
+def unread(words: list[str | Path], folder: Path) -> subprocess.CompletedProcess[str]:
+    """A program that writes into a pipe that nobody reads."""
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        [program, *words.split()],
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        cwd=tmp_path,
-        env=child_environment(),
-        text=True,
-    )
+    done = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, cwd=folder, env=child_environment(), text=True)
     os.close(writing)
+    return done
+
+
+@pytest.mark.parametrize("words", ["list", "explain paper_mixed", "run heat_slab --set time.steps=2 --out run"])
+def test_a_reader_that_has_seen_enough_ends_a_command(words: str, tmp_path: Path) -> None:
+    """No traceback, no banner, exit code 1, and the files of a run."""
+    done = unread([Path(sys.executable).parent / "warmslip", *words.split()], tmp_path)
     assert (done.returncode, done.stderr) == (1, "")
     assert (tmp_path / "run/summary.json").exists() == words.startswith("run")
+
+
+def test_a_program_whose_output_nobody_reads_gets_the_error_of_python(tmp_path: Path) -> None:
+    run = (
+        "import warmslip\nwarmslip.run(warmslip.load('heat_slab').override(**{'time.steps': 1}))\nprint(1, flush=True)"
+    )
+    done = unread([sys.executable, "-c", run], tmp_path)
+    assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder in which nobody can make files")
@@ -123,24 +129,6 @@ def test_a_folder_in_which_nothing_can_be_made(command: Command) -> None:
         done = command(*words.split())
         assert done.returncode == 2 and done.stderr.count("error:") == 1 and "/proc/" in done.stderr
         assert "Traceback" not in done.stderr
-
-
-def test_a_program_whose_output_nobody_reads_gets_the_error_of_python(tmp_path: Path) -> None:
-    program = (
-        "import warmslip\nwarmslip.run(warmslip.load('heat_slab').override(**{'time.steps': 1}))\nprint(1, flush=True)"
-    )
-    reading, writing = os.pipe()
-    os.close(reading)
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        cwd=tmp_path,
-        env=child_environment(),
-        text=True,
-    )
-    os.close(writing)
-    assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
 
 
 def test_meshes_of_other_kinds_and_with_a_byte_order_mark(tmp_path: Path) -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from support.processes import Command
-from support.sensible import FALLING, KELVIN, PRESSED, WARM, body, warnings
+from support.sensible import COUPLED, FALLING, KELVIN, PRESSED, WARM, body, warnings
 
 import warmslip
 from warmslip import Loads, Scene
@@ -18,27 +17,7 @@ from warmslip.model.discretisation import Discretisation, discretise
 from warmslip.report import cost
 from warmslip.scene import plan
 from warmslip.scene.reader import build
-from warmslip.simulation import growth
-from warmslip.simulation.pace import Step
 from warmslip.simulation.summary import summary
-
-STRETCHED = {"tensor": [[0.0, 0.0], [0.0, 3.0]]}
-# a column, as in test_coupling_limit, in steps of 0.54 where 0.533 is the longest that staggered ones stand
-COUPLED: dict[str, Any] = {
-    "mesh": {"shape": "square", "n": 4},
-    "time": {"end": 162.0, "steps": 300},
-    "elasticity": {"lame": [0.0, 0.75]},
-    "viscosity": {"lame": [0.0, 1.0]},
-    "heat": {
-        "conductivity": 1e-6,
-        "capacity": 1.0,
-        "expansion": STRETCHED,
-        "heating": {"tensor": [[0.0, 0.0], [0.0, -3.0]]},
-    },
-    "supports": {"displacement": ["top"]},
-    "initial": {"temperature": 1e-5},
-}
-
 
 TURNED = {  # a corner that moves and turns the body
     **{key: value for key, value in FALLING.items() if key not in ("initial", "contact")},
@@ -340,34 +319,6 @@ def test_a_resumed_run_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
     again = warmslip.run(scene, out=tmp_path, resume=True)
     assert again.completed and again.summary["warnings"] == whole
-
-
-def test_growth_goes_on_after_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What each step has changed is in the checkpoint too."""
-    from warmslip.simulation import signals
-
-    scene = body(COUPLED, output__checkpoint=20, time={"end": 108.0, "steps": 200})
-    whole = warnings(scene)
-    assert any(one.startswith("the coupling feeds the run") for one in whole)
-    asked: list[int] = []
-    with monkeypatch.context() as patched:
-        patched.setattr(signals.Interruption, "agreed", lambda *_: (asked.append(1) or len(asked) == 175, False))
-        assert warmslip.run(scene, out=tmp_path).outcome == "interrupted"
-    again = warmslip.run(scene, out=tmp_path, resume=True)
-    assert again.completed and again.summary["warnings"] == whole
-
-
-@pytest.mark.parametrize(("mechanical", "warned"), [(0.0, True), (1.0, True), (1e3, False)])
-def test_a_growth_without_heat_is_not_the_coupling_s(mechanical: float, warned: bool) -> None:
-    """What climbs has its part of heat, g theta^2 with g = |M|/|R| = 2."""
-    simulation = warmslip.Simulation(body(COUPLED, heat__heating={"tensor": [[0.0, 0.0], [0.0, -1.5]]}))
-    for n in range(60):
-        heat = 1.2**n
-        balances = SimpleNamespace(heat_damping=heat / 2, inertia_damping=mechanical * heat, elastic_damping=0.0)
-        simulation.monitor._growth(balances, Step(n + 1, 0.1 * (n + 1), 0.1, last=False, begin=0.1 * n), [])
-    assert bool(simulation.monitor.fed()) == warned
-    share = simulation.monitor.seen["course"]["rows"][-1][0] - growth.log(1.2**59 * (1 + mechanical))
-    assert share == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.mpi
