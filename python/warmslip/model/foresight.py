@@ -10,6 +10,7 @@ import numpy as np
 from warmslip.model.coupling import Coupled, coupled
 from warmslip.model.discretisation import Discretisation
 from warmslip.model.foundation import ShapeGap
+from warmslip.model.initial import missing_fields
 from warmslip.model.load_kinks import load_kinks
 from warmslip.model.loads import Formula, evaluate, of_time
 from warmslip.model.loads import data as read
@@ -29,8 +30,15 @@ def before(d: Discretisation) -> list[str]:
         *load_kinks(d),
         *_starts(d),
         *_warm_corners(d),
+        *_missing(d),
         *_coupling(d),
     ]
+
+
+def _missing(d: Discretisation) -> list[str]:
+    """Fields that the run which the scene begins with does not have."""
+    names = d.remember("missing", lambda: missing_fields(d.scene))
+    return [plausibility.starts_at_zero(str(d.scene.initial.run), name) for name in names]
 
 
 def _warm_corners(d: Discretisation) -> list[str]:

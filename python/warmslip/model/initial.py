@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,6 @@ from warmslip.model.loads import data, evaluate
 from warmslip.model.point_location import interpolated
 from warmslip.scene.scene import Scene
 from warmslip.typing import Array
-
-log = logging.getLogger(__name__)
 
 SAME = 1e-9  # relative difference of times that are one
 FITS = 1e-6  # relative to the displacement: how far supports may be from the state that a run begins with
@@ -39,12 +36,6 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
     if initial.run is not None:
         found = _read(initial.run, initial.time)
         _refuse_another_body(found, x, initial.run)
-        for name, needed, there in (
-            ("temperature", scene.heat is not None, found.theta),
-            ("displacement", scene.moves, found.u),
-        ):
-            if needed and there is None:
-                log.warning("initial.from: the run in '%s' has no %s; it is taken as 0 at the start", initial.run, name)
         same = np.array_equal(found.nodes, x) and np.array_equal(found.cells, mesh.cells)
         u, w, theta = _on_mesh(found, x, same)
         _refuse_jump(vectors, initial.run, u, FITS if same else BETWEEN)
@@ -55,6 +46,18 @@ def initial_fields(scene: Scene, mesh: Any, vectors: LoadVectors) -> tuple[Array
         return evaluate(data(value) if value is not None else 0.0, x, 0.0, components, f"initial.{name}")
 
     return start("displacement", d), start("velocity", d), start("temperature", 1)[:, 0]
+
+
+def missing_fields(scene: Scene) -> list[str]:
+    """What a scene needs of the state it begins with and the run does not have; nothing where that run is gone."""
+    import h5py
+
+    if scene.initial.run is None or not Path(scene.initial.run).is_file():
+        return []
+    with h5py.File(scene.initial.run, "r", locking=False) as file:
+        there = list(file["states"])
+    needed = {"displacement": ("u", scene.moves), "temperature": ("theta", scene.heat is not None)}
+    return [words for words, (name, wanted) in needed.items() if wanted and name not in there]
 
 
 def refuse_unusable(scene: Scene, mesh: Any) -> None:

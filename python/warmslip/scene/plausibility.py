@@ -141,6 +141,11 @@ def warm_corner(first: str, last: str, one: float, other: float, place: Sequence
     )
 
 
+def starts_at_zero(run: str, field: str) -> str:
+    """A field that a scene has, and the run whose state it begins with has not."""
+    return f"the run in '{run}' has no {field}, which is taken as 0 at the start; begin with a run that has one"
+
+
 def carried(moved: float, size: float) -> list[str]:
     """Of the largest displacement of a body without inertia whose supports and foundation rest, and its size, lengths."""
     if moved <= size:

@@ -20,6 +20,7 @@ from support.stopped import KilledError, stop_after
 import warmslip
 from warmslip.scene.reader import build
 from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 
 def scene(end: float = 0.5, steps: int = 8, **keys: Any) -> warmslip.Scene:
@@ -297,6 +298,18 @@ def test_a_complete_run_stays_as_it_is(tmp_path: Path, caplog: pytest.LogCapture
     assert "is complete and stays as it is; output.every holds for new steps alone" in told
 
 
+def test_the_contact_of_a_summary_is_that_of_the_last_report() -> None:
+    simulation = Simulation(scene())
+    *_, (_, report) = simulation.steps()
+    found = summary(simulation)["contact"]
+    assert min(report.open, report.slip) > 0 and report.normal_force > 0
+    for name in ("open", "stick", "slip"):
+        assert found[name] == getattr(report, name)
+    assert (found["normal_force"], found["max_penetration"]) == (report.normal_force, report.max_penetration)
+    assert found["tangential_force"] == pytest.approx(np.linalg.norm(report.friction_traction), rel=1e-14)
+    np.testing.assert_allclose(found["traction"], report.traction, rtol=1e-14)
+
+
 def test_a_summary_that_was_lost_is_written_from_the_state(tmp_path: Path) -> None:
     """No step is left to take: forces, statuses and penetration are those of the stored state."""
     whole = warmslip.run(scene(), out=tmp_path)
@@ -369,17 +382,18 @@ def test_a_state_of_another_body_is_refused(tmp_path: Path) -> None:
             warmslip.run(other)
 
 
-def test_a_temperature_that_another_run_does_not_have_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_temperature_that_another_run_does_not_have_is_said(tmp_path: Path) -> None:
     still = {
         "mesh": {"n": 4},
         "time": {"steps": 1},
         "elasticity": {"lame": [1.0, 1.0]},
         "supports": {"displacement": ["top"]},
     }
-    run = warmslip.run(build(still), out=tmp_path)
-    warmslip.run(build(still | {"heat": {"conductivity": 1.0}, "initial": {"from": str(run.trajectory)}}))
-    (told,) = caplog.messages
-    assert "has no temperature; it is taken as 0 at the start" in told
+    heat = {"conductivity": 1.0, "capacity": 1.0}
+    for begun, told in ((still, 1), (still | {"heat": heat}, 0)):
+        run = warmslip.run(build(begun), out=tmp_path)
+        found = warmslip.run(build(still | {"heat": heat, "initial": {"from": str(run.trajectory)}}))
+        assert sum("has no temperature, which is taken as 0" in one for one in found.summary["warnings"]) == told
 
 
 def test_supports_whose_shape_no_coarse_mesh_has(tmp_path: Path) -> None:
