@@ -205,7 +205,7 @@ class Material2:
     def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"] | None:
         ...
     @property
-    def out_of_plane(self) -> list[float]:
+    def out_of_plane(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
         what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz
         """
@@ -282,7 +282,7 @@ class Material3:
     def heating(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"] | None:
         ...
     @property
-    def out_of_plane(self) -> list[float]:
+    def out_of_plane(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
         what tr eps(u), tr eps(w) and -(theta - reference) are multiplied by in sigma_zz
         """
@@ -589,7 +589,7 @@ class Operators3:
     @property
     def mass(self) -> petsc4py.PETSc.Mat | None:
         """
-        (theta, eta)
+        (theta, eta), times the capacity
         """
     @property
     def inertia(self) -> petsc4py.PETSc.Mat | None:
@@ -1251,7 +1251,7 @@ class Stepper2:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(16)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
@@ -1260,9 +1260,9 @@ class Stepper2:
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def extents(self) -> typing.Annotated[list[float], "FixedSize(13)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(16)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; last the largest nodal force.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force and the largest displacements of contact points, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1477,7 +1477,7 @@ class Stepper3:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(13)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(16)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
@@ -1486,9 +1486,9 @@ class Stepper3:
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def extents(self) -> typing.Annotated[list[float], "FixedSize(13)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(16)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; last the largest nodal force.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force and the largest displacements of contact points, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

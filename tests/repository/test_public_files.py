@@ -32,6 +32,25 @@ def test_stubs_name_everything_in_the_core() -> None:
         assert not missing, f"the stubs of {name} lack {missing}"
 
 
+@pytest.mark.parametrize(
+    "name", [n for n, kind in vars(_core).items() if isinstance(kind, type) and not hasattr(kind, "__members__")]
+)
+def test_stubs_have_the_sizes_and_the_words_of_the_core(name: str) -> None:
+    stub = (PACKAGE / "_core.pyi").read_text()
+    begin = re.search(rf"^class {name}\b", stub, re.MULTILINE)
+    assert begin is not None
+    block = re.split(r"^(?=class |def )", stub[begin.start() + 1 :], maxsplit=1, flags=re.MULTILINE)[0]
+    for member, value in vars(getattr(_core, name)).items():
+        if member.startswith("_"):
+            continue
+        signature = (value.fget.__doc__ if isinstance(value, property) else value.__doc__) or ""
+        sizes = set(re.findall(r"FixedSize\(\d+\)", signature))
+        there = set(re.findall(r"FixedSize\(\d+\)", " ".join(re.findall(rf"def {member}\(.*", block))))
+        assert sizes <= there, f"{name}.{member} has {sizes}, its stub {there}"
+        if isinstance(value, property):
+            assert (value.__doc__ or "").strip() in block, f"{name}.{member} has other words than its stub"
+
+
 def test_readme_examples_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
