@@ -238,13 +238,12 @@ def draw(
     """Draw a figure from tables."""
     import warmslip.figures as figures
 
-    figures.draw(kind, inputs, out, _contact_parts)
+    def contact_parts(path: Path) -> list[Any]:
+        from warmslip.io import drawn  # the compiled core, which other figures do not need
 
+        return drawn.lines(path, told=len(inputs) > 1)
 
-def _contact_parts(path: Path) -> list[Any]:
-    from warmslip.io import drawn  # the compiled core, which other figures do not need
-
-    return drawn.lines(path)
+    figures.draw(kind, inputs, out, contact_parts)
 
 
 def trade(

@@ -6,7 +6,6 @@ Every drawing is a function of its input files that returns a figure and a capti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,12 +52,6 @@ def _words(error: Exception) -> str:
     return "there are too few rows" if isinstance(error, IndexError) else str(error)
 
 
-def _of(part: Any, path: Path, runs: int) -> Any:
-    """A contact part, with the folder of its run in its name where there are several."""
-    folder = path.name if path.is_dir() else path.parent.name
-    return replace(part, part=f"{part.part}' of '{folder}") if runs > 1 else part
-
-
 def draw(kind: str, inputs: list[Path], out: Path, contact: Callable[[Path], list[Any]] | None = None) -> None:
     """Draws `kind` from `inputs` into `out` (PNG), with its caption beside it as .rst.
 
@@ -74,9 +67,7 @@ def draw(kind: str, inputs: list[Path], out: Path, contact: Callable[[Path], lis
     with style.applied():
         try:
             read = contact if module == "contact" else None
-            given_to = (
-                [_of(part, path, len(inputs)) for path in inputs for part in read(path)] if read else list(inputs)
-            )
+            given_to = [part for path in inputs for part in read(path)] if read else list(inputs)
             figure, caption = drawing(given_to)
         except (LookupError, TypeError, ValueError) as error:
             given = ", ".join(str(path) for path in inputs)

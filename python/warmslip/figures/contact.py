@@ -18,7 +18,7 @@ from warmslip.messages import quoted
 from warmslip.typing import Array
 
 STATUS = (("open", "#d9d9d9"), ("stick", SKY), ("slip", VERMILLION))
-ARC_LENGTH = "arc length along '{}' (length)"
+ARC_LENGTH = "arc length along {} (length)"
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,12 @@ class ContactLine:
     status: Any
     bound: Array | None
     temperature: Array | None
+    run: str = ""  # which is told where several are drawn
+
+    @property
+    def name(self) -> str:
+        """The part in quotes, of which run if it is told."""
+        return f"'{self.part}'" + (f" of '{self.run}'" if self.run else "")
 
     @property
     def mean_slip(self) -> Array:
@@ -98,7 +104,7 @@ def pressure_on(axes: Any, line: ContactLine, times: Any = None) -> str:
         _curve(lower, line.arc_length, line.traction[step], color=colour)
     for ax in axes:
         ax.axhline(0, color=GREY, lw=0.5, zorder=0)
-        ax.set_xlabel(ARC_LENGTH.format(line.part))
+        ax.set_xlabel(ARC_LENGTH.format(line.name))
     upper.set_ylabel("contact pressure (stress)")
     lower.set_ylabel("friction traction on the body (stress)")
     upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(len(steps), 4), columnspacing=1.2)
@@ -107,7 +113,7 @@ def pressure_on(axes: Any, line: ContactLine, times: Any = None) -> str:
         lower.legend(handles=[dashed], loc="lower center", bbox_to_anchor=(0.5, 1.0))
     largest = ", ".join(f"{number(float(line.pressure[i].max()))} at t = {number(line.time[i])}" for i in steps)
     shaded = "; dashed: the friction bound" * (line.bound is not None)
-    return f"Contact pressure and friction traction along '{line.part}'{shaded}. Largest pressure: {largest}."
+    return f"Contact pressure and friction traction along {line.name}{shaded}. Largest pressure: {largest}."
 
 
 def stick_slip_on(ax: Any, line: ContactLine) -> str:
@@ -122,13 +128,11 @@ def stick_slip_on(ax: Any, line: ContactLine) -> str:
         norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3),
         rasterized=True,
     )
-    ax.set(xlabel="time", ylabel=ARC_LENGTH.format(line.part))
+    ax.set(xlabel="time", ylabel=ARC_LENGTH.format(line.name))
     patches = [Patch(fc=colour, ec=INK, lw=0.4, label=name) for name, colour in STATUS]
     ax.legend(handles=patches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     shares = ", ".join(f"{100 * float(np.mean(line.status == i)):.0f} % {name}" for i, (name, _) in enumerate(STATUS))
-    return (
-        f"Status of the points of '{line.part}' over {len(line.time)} steps to t = {number(line.time[-1])}: {shares}."
-    )
+    return f"Status of the points of {line.name} over {len(line.time)} steps to t = {number(line.time[-1])}: {shares}."
 
 
 def borders(x: Array, weights: Array) -> Array:
@@ -148,12 +152,12 @@ def friction_on(ax: Any, line: ContactLine) -> str:
     ax.plot(moved[-1], force[-1], "o", color=VERMILLION, ms=5, label=f"t = {number(line.time[-1])}")
     ax.axhline(0, color=GREY, lw=0.5, zorder=0)
     ax.set(
-        xlabel=f"mean tangential displacement of '{line.part}' (length)",
+        xlabel=f"mean tangential displacement of {line.name} (length)",
         ylabel="friction force (force per depth)",
     )
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return (
-        f"Friction force on the body over the mean tangential displacement of '{line.part}', both positive along the part: "
+        f"Friction force on the body over the mean tangential displacement of {line.name}, both positive along the part: "
         f"{number(float(force.min()))} to {number(float(force.max()))}."
     )
 
@@ -172,11 +176,11 @@ def temperature_on(ax: Any, line: ContactLine, times: Any = None) -> str:
     steps = sorted({int(stored[i]) for i in chosen})
     for step, colour in zip(steps, _shades(len(steps)), strict=True):
         _curve(ax, line.arc_length, line.temperature[step], color=colour, label=f"t = {number(line.time[step])}")
-    ax.set(xlabel=ARC_LENGTH.format(line.part), ylabel="temperature of the body")
+    ax.set(xlabel=ARC_LENGTH.format(line.name), ylabel="temperature of the body")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(len(steps), 4), columnspacing=1.2)
     last = line.temperature[steps[-1]]
     return (
-        f"Temperature of the body along '{line.part}', at t = {number(line.time[steps[-1]])} "
+        f"Temperature of the body along {line.name}, at t = {number(line.time[steps[-1]])} "
         f"{number(float(last.min()))} to {number(float(last.max()))}."
     )
 

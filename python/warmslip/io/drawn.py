@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -103,12 +104,13 @@ def line(t: Trajectory, part: str | None = None) -> ContactLine:
     )
 
 
-def lines(path: Path) -> list[ContactLine]:
-    """Every contact part of a stored run, given by its file or its folder. Raises ValueError, OSError."""
-    with Trajectory(path / "trajectory.h5" if path.is_dir() else path) as t:
+def lines(path: Path, *, told: bool = False) -> list[ContactLine]:
+    """Every contact part of a stored run, given by its file or its folder, which is `told`. Raises ValueError, OSError."""
+    file = path / "trajectory.h5" if path.is_dir() else path
+    with Trajectory(file) as t:
         if not t.contact_parts:
             raise ValueError("the run has no contact points")
-        return [line(t, part) for part in t.contact_parts]
+        return [replace(line(t, part), run=file.resolve().parent.name if told else "") for part in t.contact_parts]
 
 
 def history(t: Trajectory, d: Discretisation) -> dict[str, dict[str, Array]]:

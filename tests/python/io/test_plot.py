@@ -162,3 +162,14 @@ def test_plotting_leaves_the_backend_alone(result: Result) -> None:
     )
     done: Any = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "svg"
+
+
+def test_panels_of_several_runs_name_them(command: Command, tmp_path: Path) -> None:
+    small = ["--set", "mesh.n=4", "--set", "time.steps=2"]
+    for name in ("one", "other"):
+        assert command("run", "paper_mixed", *small, "--out", name).returncode == 0
+    assert command("draw", "pressure", "one", "other/trajectory.h5", "--out", "both.png").returncode == 0
+    assert command("draw", "pressure", "one", "--out", "single.png").returncode == 0
+    both, single = ((tmp_path / f"{name}.rst").read_text() for name in ("both", "single"))
+    assert "along 'bottom' of 'one'" in both and "along 'bottom' of 'other'" in both
+    assert "along 'bottom'" in single and " of 'one'" not in single
