@@ -263,9 +263,11 @@ void bind_stepper(py::module_& m) {
   field("stress", &Errors::stress);
   field("contact_force", &Errors::contact_force);
   errors.attr("fields") = py::tuple(fields);
+  errors.def_property_readonly("measured", &Errors::measured, "Whether the error of any field was estimated.");
 
-  auto cost =
-      py::class_<Cost>(m, "Cost", "What a run cost so far: CPU seconds of this process, counts, bytes of the factors.");
+  auto cost = py::class_<Cost>(m, "Cost",
+                               "What a run cost so far: CPU seconds of this process for the set-up and the steps, "
+                               "elapsed seconds for the parts of a step, counts, bytes of the factors.");
   py::list items;
   const auto item = [&](const char* attribute, auto member) {
     cost.def_readonly(attribute, member);

@@ -772,6 +772,11 @@ class Errors:
     def contact_force(self) -> float:
         ...
     @property
+    def measured(self) -> bool:
+        """
+        Whether the error of any field was estimated.
+        """
+    @property
     def stress(self) -> float:
         ...
     @property
@@ -1100,7 +1105,7 @@ class Balances:
         ...
 class Cost:
     """
-    What a run cost so far: CPU seconds of this process, counts, bytes of the factors.
+    What a run cost so far: CPU seconds of this process for the set-up and the steps, elapsed seconds for the parts of a step, counts, bytes of the factors.
     """
     items: typing.ClassVar[tuple[str, ...]] = ('setup_seconds', 'step_seconds', 'momentum_seconds', 'contact_seconds', 'heat_seconds', 'balance_seconds', 'steps', 'refinements', 'estimates', 'substitutions', 'factorizations', 'dense_factorizations', 'newton_iterations', 'factor_bytes')
     @property

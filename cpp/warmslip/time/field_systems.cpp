@@ -164,7 +164,7 @@ Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec
 
 template <int d>
 bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution) {
-  const Timed timed(cost_.contact_seconds);
+  const WallTimed timed(cost_.contact_seconds);
   solution = systems_->contact->solve(posed_, guess);
   if (solution.converged && surface_.shares())
     minimal_forces(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
@@ -195,7 +195,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     from.setZero();
     if (!reach_motion(loads, from, contact)) return false;
   }
-  const Timed part(cost_.momentum_seconds);
+  const WallTimed part(cost_.momentum_seconds);
   if (systems_->rigid.empty()) {
     expand(contact, next_.w, next_.theta);
   } else {
@@ -211,7 +211,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
 template <int d>
 bool Stepper<d>::reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact) {
   {
-    const Timed part(cost_.momentum_seconds);
+    const WallTimed part(cost_.momentum_seconds);
     momentum_right_side(loads, from);
     if (monolithic()) {
       heat_right_side(loads, nullptr, systems_->coupled_scale);
@@ -248,7 +248,7 @@ typename Stepper<d>::NodalFlow Stepper<d>::flow(const StepLoads& loads, const Ei
 
 template <int d>
 void Stepper<d>::solve_heat(const StepLoads& loads, Vec heating_w) {
-  const Timed timed(cost_.heat_seconds);
+  const WallTimed timed(cost_.heat_seconds);
   heat_right_side(loads, heating_w, 1);
   if (heat_external_) WARMSLIP_PETSC(VecCopy(heat_right_, heat_external_));
   if (reactive()) {

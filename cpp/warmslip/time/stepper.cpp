@@ -61,7 +61,7 @@ Stepper<d>::Stepper(const Problem<d>& problem, const Stepper& like)
 template <int d>
 void Stepper<d>::set_step(double k) {
   if (systems_ && systems_->k == k) return;
-  const Timed timed(cost_.setup_seconds);
+  const CpuTimed timed(cost_.setup_seconds);
   if (auto kept = cache_->find(k)) {
     systems_ = std::move(kept);
   } else {
@@ -222,7 +222,7 @@ StepInputs Stepper<d>::complete(const StepLoads& loads, const ContactSolution<d>
 
 template <int d>
 Balances Stepper<d>::balance(const StepInputs& inputs) {
-  const Timed timed(cost_.balance_seconds);
+  const WallTimed timed(cost_.balance_seconds);
   return evaluator_.evaluate(now_, next_, inputs);
 }
 
@@ -250,7 +250,7 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     throw std::invalid_argument("the foundation's temperature needs one value a contact point");
   if (loads.foundation_velocity.size() != 0 && loads.foundation_velocity.size() != surface_.points() * d)
     throw std::invalid_argument("the foundation's velocity needs d values a contact point");
-  const Timed timed(cost_.step_seconds);
+  const CpuTimed timed(cost_.step_seconds);
   const int before = substitutions();
   drive_ = surface_.tangential(loads.foundation_velocity);
   errors_ = {};

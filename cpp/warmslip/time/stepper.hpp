@@ -1,5 +1,6 @@
 // Backward Euler for problem (PF): one verb, advance().
 #pragma once
+#include <cmath>
 #include <optional>
 
 #include "warmslip/time/balances.hpp"
@@ -46,6 +47,9 @@ struct Errors {
   double u = unknown, theta = unknown, stress = unknown, contact_force = unknown;
 
   double largest() const;
+  bool measured() const {
+    return !(std::isnan(u) && std::isnan(theta) && std::isnan(stress) && std::isnan(contact_force));
+  }
 };
 
 /// What is known of a field so far: its largest value, that or what rounding of the other fields may make of it if this
@@ -96,7 +100,7 @@ struct StepReport {
 /// What a run costs, so far.
 struct Cost {
   double setup_seconds = 0, step_seconds = 0;  ///< CPU of this process
-  /// Parts of step_seconds: solves with their right-hand sides, the contact solver, the balances.
+  /// Parts of a step in elapsed time: solves with their right-hand sides, the contact solver, the balances.
   double momentum_seconds = 0, contact_seconds = 0, heat_seconds = 0, balance_seconds = 0;
   int steps = 0, refinements = 0, substitutions = 0, factorizations = 0, dense_factorizations = 0,
       newton_iterations = 0;

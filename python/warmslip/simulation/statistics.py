@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 BALANCES = ("energy", "heat", "force", "law")
+RESIDUALS = {name: f"{name}_residual" for name in BALANCES}  # what they are called in `_core.Balances`
 FIELDS = ("u", "theta", "stress", "contact_force")  # whose errors are estimated, `_core.Errors`
 
 
 def residuals(report: Any) -> dict[str, float]:
     """The relative residual of each balance of a step, dimensionless."""
     balances = report.balances
-    return {name: getattr(balances, f"{name}_residual") for name in BALANCES}
+    return {name: getattr(balances, attribute) for name, attribute in RESIDUALS.items()}
 
 
 def estimates(report: Any) -> dict[str, float]:
@@ -51,14 +52,16 @@ class Statistics:
     def attempted(self, report: Any) -> None:
         """Counts the work of a step, taken or not."""
         self.newton_max = max(self.newton_max, report.newton_iterations)
-        self.stages[report.stage.name] = self.stages.get(report.stage.name, 0) + 1
+        stage = report.stage.name
+        self.stages[stage] = self.stages.get(stage, 0) + 1
 
     def taken(self, report: Any, undetermined: tuple[str, ...]) -> None:
         """Counts what a step that was taken leaves; `undetermined` are the fields without digits where its report says so."""
         for name, value in residuals(report).items():
             self.residuals[name] = worse(self.residuals[name], value)
-        for name, value in estimates(report).items():
-            self.errors[name] = max(self.errors.get(name, 0.0), value)
+        if report.errors.measured:  # in few steps
+            for name, value in estimates(report).items():
+                self.errors[name] = max(self.errors.get(name, 0.0), value)
         if report.undetermined:
             self.errors |= dict.fromkeys(undetermined, 1.0)
 
