@@ -18,7 +18,7 @@ namespace {
 // A sweep fetches its factor this many entries ahead: the processor does not guess a place beyond a page, nor in a
 // sweep that runs towards lower addresses. A factor that caches hold is there already.
 constexpr std::ptrdiff_t ahead = 2048, chunk = 64;
-constexpr double cached_bytes = 8e6;
+constexpr double cached_bytes = 1e6;
 
 WARMSLIP_INLINE void fetch(const double* at, std::ptrdiff_t entries) {
   for (std::ptrdiff_t i = 0; i < entries; i += 8) __builtin_prefetch(at + i);
