@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
@@ -118,12 +119,12 @@ class Tree:
         error = re.search(r"error: .*", result.stdout + result.stderr)
         return "" if result.returncode == 0 else error[0] if error else "the build failed"
 
-    def failures(self, *, every: bool, near: str = "") -> list[str]:
-        """The tests that fail: the first, or all of them. Those that name the Python module `near` come first, without one
-        those of the core itself."""
+    def failures(self, *, every: bool, near: str = "", born: Sequence[str] = ()) -> list[str]:
+        """The tests that fail: the first, or all of them. Those that came with the fault (`born`) and those that name the Python
+        module `near` come first, without one those of the core itself."""
         found = [] if near else self._native(f"--test-case-exclude={STORED}")
         if not found or every:
-            found += self._python(near, every=every)
+            found += self._python(near, born, every=every)
         if not found or every:
             found += self._native() if near else self._native(f"--test-case={STORED}")
         return list(dict.fromkeys(found))
@@ -133,14 +134,19 @@ class Tree:
         found = [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", tests.stdout)]
         return found or self._crash(tests)
 
-    def _python(self, near: str, *, every: bool) -> list[str]:
+    def _python(self, near: str, born: Sequence[str], *, every: bool) -> list[str]:
         # of the mathematics first
         files = [
             p
             for folder in ("core", "python", "repository")
             for p in sorted((self.at / "tests" / folder).rglob("test_*.py"))
         ]
-        files.sort(key=lambda path: not (near and re.search(rf"\b{near}\b", path.read_text())))
+        files.sort(
+            key=lambda path: (
+                str(path.relative_to(self.at)) not in born,
+                not (near and re.search(rf"\b{near}\b", path.read_text())),
+            )
+        )
         tests = self._run(
             *(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE"),
             *([] if every else ["-x"]),
@@ -186,7 +192,7 @@ class Tree:
             if error:
                 return Found(fault, "invalid", error)
             python = fault.file.endswith(".py")
-            failed = self.failures(every=every, near=path.stem if python else "")
+            failed = self.failures(every=every, near=path.stem if python else "", born=born_with(fault))
             if workflow:
                 failed += [f"workflow: {name}" for name in self.verdict()]
             return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
@@ -255,6 +261,18 @@ def main() -> int:
             list(pool.map(one, chosen))
 
     return report(list(table.values()))
+
+
+def born_with(fault: Fault) -> list[str]:
+    """The files of tests that were changed by the commit with which the fault came; none without a history."""
+    found = subprocess.run(
+        ["git", "log", "--full-diff", "--format=", "--name-only", f'-Sname = "{fault.name}"', "--", "tests/mutants"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return found.stdout.split()
 
 
 def commit() -> str:
