@@ -266,7 +266,17 @@ def main() -> int:
 def born_with(fault: Fault) -> list[str]:
     """The files of tests that were changed by the commit with which the fault came; none without a history."""
     found = subprocess.run(
-        ["git", "log", "--full-diff", "--format=", "--name-only", f'-Sname = "{fault.name}"', "--", "tests/mutants"],
+        [
+            "git",
+            "log",
+            "--full-diff",
+            "--pickaxe-all",
+            "--format=",
+            "--name-only",
+            f'-Sname = "{fault.name}"',
+            "--",
+            "tests/mutants",
+        ],
         cwd=ROOT,
         capture_output=True,
         text=True,
