@@ -4,6 +4,7 @@
 #include <petscsf.h>
 
 #include <algorithm>
+#include <string_view>
 
 namespace warmslip {
 namespace {
@@ -190,12 +191,12 @@ VecHandle Layout<d>::vector(int block) const {
 }
 
 template <int d>
-MatHandle Layout<d>::matrix(int rows, int cols) const {
+MatHandle Layout<d>::matrix(int rows, int cols, MatType type) const {
   MatHandle a;
   WARMSLIP_PETSC(MatCreate(comm_, a.out()));
   WARMSLIP_PETSC(MatSetSizes(a, owned_ * rows, owned_ * cols, PETSC_DETERMINE, PETSC_DETERMINE));
   WARMSLIP_PETSC(MatSetBlockSizes(a, rows, cols));
-  WARMSLIP_PETSC(MatSetType(a, MATAIJ));
+  WARMSLIP_PETSC(MatSetType(a, type));
   std::vector<PetscInt> near, far;
   for (PetscInt i = 0; i < owned_; ++i)
     for (int r = 0; r < rows; ++r) {
@@ -204,8 +205,10 @@ MatHandle Layout<d>::matrix(int rows, int cols) const {
     }
   WARMSLIP_PETSC(MatSeqAIJSetPreallocation(a, 0, near.data()));
   WARMSLIP_PETSC(MatMPIAIJSetPreallocation(a, 0, near.data(), 0, far.data()));
-  WARMSLIP_PETSC(
-      MatSetOption(a, MAT_USE_INODES, PETSC_FALSE));  // for rows this short the plain product is twice as fast
+  WARMSLIP_PETSC(MatSeqBAIJSetPreallocation(a, rows, 0, diagonal_.data()));
+  WARMSLIP_PETSC(MatMPIBAIJSetPreallocation(a, rows, 0, diagonal_.data(), 0, off_diagonal_.data()));
+  if (std::string_view(type) == MATAIJ)  // for rows this short the plain product is twice as fast
+    WARMSLIP_PETSC(MatSetOption(a, MAT_USE_INODES, PETSC_FALSE));
   return a;
 }
 

@@ -28,8 +28,8 @@ class Layout {
 
   /// A zero vector of block size `block`, ghosted.
   VecHandle vector(int block) const;
-  /// An empty matrix of the P1 sparsity, `rows` x `cols` unknowns a node, preallocated.
-  MatHandle matrix(int rows, int cols) const;
+  /// An empty matrix of the P1 sparsity, `rows` x `cols` unknowns a node, preallocated; in square blocks with MATBAIJ.
+  MatHandle matrix(int rows, int cols, MatType type = MATAIJ) const;
   /// Adds a dense element block to `a`; finish with `assemble`.
   void add(Mat a, Eigen::Index cell, const double* row_major_block) const;
   static void assemble(Mat a);

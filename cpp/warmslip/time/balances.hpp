@@ -6,6 +6,11 @@
 
 namespace warmslip {
 
+/// Samples of rounding of which an estimate of errors takes the worst. Where one direction decides, one sample is ten
+/// times too small in 6 % of all cases, and three are in one of 1,200 (compare Kenney & Laub, SIAM J. Sci. Comput. 15,
+/// 1994).
+constexpr int rounding_samples = 3;
+
 template <int d>
 class BalanceEvaluator {
  public:
@@ -34,9 +39,9 @@ class BalanceEvaluator {
   /// what friction gives to the body. Empty where the contact does neither.
   const Eigen::MatrixX2d& contact_heat_flow() const { return contact_heat_flow_; }
   /// Adds to a defect what rounding of the operators' entries and of the sums may have in it, with signs that change
-  /// from node to node: the unit round-off of the magnitudes of the equations' terms (Bauer & Skeel). `external`, if
-  /// any, gets the same but for the inner terms, whose rounding moves no rigid body.
-  void add_rounding(Vec defect, Vec external) const;
+  /// from node to node, others for every sample: the unit round-off of the magnitudes of the equations' terms (Bauer &
+  /// Skeel). `external`, if any, gets the same but for the inner terms, whose rounding moves no rigid body.
+  void add_rounding(int sample, Vec defect, Vec external) const;
 
  private:
   Balances terms(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);

@@ -61,7 +61,8 @@ void BalanceEvaluator<d>::heat_defect(const TimeLevel& before, const TimeLevel& 
 }
 
 template <int d>
-void BalanceEvaluator<d>::add_rounding(Vec defect, Vec external) const {
+void BalanceEvaluator<d>::add_rounding(int sample, Vec defect, Vec external) const {
+  constexpr std::uint32_t multipliers[rounding_samples] = {2654435761u, 2246822519u, 3266489917u};
   const Eigen::Index block = block_size(defect);
   const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
                         &outer = block == 1 ? heat_external_ : force_external_;
@@ -70,7 +71,7 @@ void BalanceEvaluator<d>::add_rounding(Vec defect, Vec external) const {
     for (PetscInt i = 0; i < layout_.owned(); ++i)
       for (Eigen::Index a = 0; a < block; ++a) {
         const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
-        const double sign = ((number * 2654435761u) >> 16 & 1u) != 0 ? 0.5 : -0.5;
+        const double sign = ((number * multipliers[sample]) >> 16 & 1u) != 0 ? 0.5 : -0.5;
         (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
         if (external)
           (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];

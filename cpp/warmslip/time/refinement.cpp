@@ -27,26 +27,34 @@ double Errors::largest() const {
   return worst;
 }
 
-// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `least`.
+template <int d>
+void Stepper<d>::forget_errors() {
+  errors_ = {};
+  for (Extent* field : extents_.all()) field->tried = 0;
+}
+
+// Notes a change of a field: its error is relative to its largest value so far, taken to be no smaller than `least`. Of
+// several the worst is kept.
 template <int d>
 void Stepper<d>::note(double& error, Extent& field, double change, double size, double least) {
-  field.tried = change;
+  field.tried = std::max(field.tried, change);
   field.size = std::max(field.size, size);
   field.scale = std::max({field.scale, size, least});
-  error = field.scale > 0 ? change / field.scale : 0;
+  error = std::fmax(error, field.scale > 0 ? change / field.scale : 0);
 }
 
 // One step of iterative refinement, contact included: the defect is solved for like a load, and the contact problem is
-// solved again with the free velocity it corrects. What changes is an estimate of the errors; with `apply` it is taken.
+// solved again with the free velocity it corrects. With a sample of rounding in the defect, what changes is an estimate
+// of the errors; without one the change is taken.
 template <int d>
 bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact,
-                                bool apply) {
-  const bool monolithic = this->monolithic();
+                                std::optional<int> sample) {
+  const bool monolithic = this->monolithic(), apply = !sample;
   const StepInputs inputs = this->inputs(loads, contact);
   evaluator_.momentum_defect(now_, next_, inputs, momentum_right_, momentum_external_);
-  if (!apply) evaluator_.add_rounding(momentum_right_, momentum_external_);
+  if (sample) evaluator_.add_rounding(*sample, momentum_right_, momentum_external_);
   if (monolithic) {
-    coupled_heat_defect(inputs, !apply);
+    coupled_heat_defect(inputs, sample);
     join(momentum_right_, heat_right_, coupled_right_);
   }
   const Eigen::VectorXd correction = reduce(monolithic ? coupled_right_ : momentum_right_, momentum_external_);
@@ -124,9 +132,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
 // The defect of the heat equation of a monolithic step, in heat_right_. Conduction warms no part as a whole: what its
 // rounding would is taken off, as the capacity of a long step may be far smaller.
 template <int d>
-void Stepper<d>::coupled_heat_defect(const StepInputs& inputs, bool with_rounding) {
+void Stepper<d>::coupled_heat_defect(const StepInputs& inputs, std::optional<int> sample) {
   evaluator_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
-  if (with_rounding) evaluator_.add_rounding(heat_right_, heat_external_);
+  if (sample) evaluator_.add_rounding(*sample, heat_right_, heat_external_);
   if (systems_->constants.empty()) return;
   WARMSLIP_PETSC(VecAXPY(heat_right_, -1, heat_external_));
   systems_->constants.remove(heat_right_);
@@ -155,13 +163,13 @@ void Stepper<d>::note_temperature(const Balances& balances) {
 }
 
 template <int d>
-void Stepper<d>::correct_heat(const StepInputs& inputs, const Balances& balances, bool apply) {
+void Stepper<d>::correct_heat(const StepInputs& inputs, const Balances& balances, std::optional<int> sample) {
   evaluator_.heat_defect(now_, next_, inputs, heat_right_, heat_external_);
-  if (!apply) evaluator_.add_rounding(heat_right_, heat_external_);
+  if (sample) evaluator_.add_rounding(*sample, heat_right_, heat_external_);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note_temperature(balances);
-  if (apply) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
+  if (!sample) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
 
 // Adds the temperature that the estimated errors of velocity and contact force make, by straining and by what the
@@ -185,6 +193,29 @@ void Stepper<d>::add_heat_of_error(const StepLoads& loads) {
   }
   solve_heat(heat_right_, heat_external_, given, none, correction_theta_);
   extents_.theta.tried += largest_entry(correction_theta_);
+}
+
+// Adds the motion that the estimated error of the temperature makes, which the next step takes as given: its thermal
+// forces are in momentum_right_. It ends no run, as the heat of an error of the motion does not.
+template <int d>
+void Stepper<d>::add_motion_of_error(const ContactSolution<d>& contact) {
+  hold(momentum_right_, nullptr);
+  if (momentum_external_) WARMSLIP_PETSC(VecSet(momentum_external_, 0));  // they move no body as a whole
+  const Eigen::VectorXd cause = reduce(momentum_right_, momentum_external_);
+  ContactSolution<d> change = contact;
+  if (systems_->contact) {
+    posed_.rigid = rigid_load_;
+    if (!respond(cause, {}, change)) return;
+    change.force = change.added;
+    extents_.contact_force.tried += largest_entry(surface_.to_nodes(change.force));
+  }
+  const Vec change_w = systems_->rigid.empty() ? correction_w_ : correction_strained_, change_u = momentum_right_;
+  const Eigen::VectorXd motions = expand(change, change_w, nullptr);
+  WARMSLIP_PETSC(VecCopy(change_w, change_u));
+  WARMSLIP_PETSC(VecScale(change_u, systems_->k));
+  extents_.stress.tried += stress_size(layout_, problem_, change_u, change_w).largest;
+  if (!systems_->rigid.empty()) systems_->rigid.carry(systems_->k * motions, change_u);
+  extents_.u.tried += largest_entry(change_u);
 }
 
 // The response of the contact; every rank found it, and they agree whether there is one.
@@ -307,17 +338,17 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   bool refined = false, warmed = false;
   double warmer = Errors::unknown;
   const bool creeps = systems_->contact && largest_entry(creep(contact)) > 1e-14 * next_.sizes.straining;
-  if (creeps && correct_motion(loads, balances, contact, true)) {
+  if (creeps && correct_motion(loads, balances, contact)) {
     balances = balances_of(loads, contact);
     ++cost_.refinements;
-    errors_ = {};
-    for (Extent* field : extents_.all()) field->tried = 0;
   }
+  forget_errors();
   for (int pass = 0; systems_->momentum && pass < options_.passes && !done(motion(), errors_.largest()); ++pass) {
     const double rest = motion(), error = errors_.largest();
     const Motion before = motion_of(contact);
     const bool was_closed = closed(balances);
-    if (!correct_motion(loads, balances, contact, true)) break;
+    forget_errors();
+    if (!correct_motion(loads, balances, contact)) break;
     balances = balances_of(loads, contact);
     ++cost_.refinements;
     refined = true;
@@ -330,7 +361,8 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   }
   for (int pass = 0; systems_->heat && pass < options_.passes && !done(warmth(), errors_.theta); ++pass) {
     const double rest = warmth();
-    correct_heat(inputs(loads, contact), balances, true);
+    forget_errors();
+    correct_heat(inputs(loads, contact), balances);
     products(next_);
     balances = balance(inputs(loads, contact));
     ++cost_.refinements;
@@ -342,15 +374,35 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   const bool wanted = measured_now(loads, contact);
   if (!wanted && !refined && !warmed) return balances;
   const int before = substitutions();
-  const bool moved = systems_->momentum && (refined || wanted);
-  evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
-  if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, false);
-  if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
-  if (systems_->heat && (warmed || wanted)) correct_heat(inputs(loads, contact), balances, false);
-  if (systems_->heat && moved && !undetermined_) add_heat_of_error(loads);
+  estimate(loads, balances, contact, systems_->momentum && (refined || wanted), systems_->heat && (warmed || wanted));
   cost_.substitutions -= substitutions() - before;
   ++cost_.estimates;
   return balances;
+}
+
+// Estimates the errors of the motion and of the temperature, and what either makes of the other.
+template <int d>
+void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool moved,
+                          bool warmed) {
+  evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
+  forget_errors();
+  std::array<double, 4> worst{};
+  for (int sample = 0; sample < rounding_samples; ++sample) {
+    for (Extent* field : extents_.all()) field->tried = 0;
+    if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, sample);
+    if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
+    if (warmed) correct_heat(inputs(loads, contact), balances, sample);
+    if (moved && !undetermined_) {
+      const bool strains = warmed && operators_.expansion;
+      if (strains) multiply(operators_.expansion, correction_theta_, momentum_right_);
+      if (systems_->heat) add_heat_of_error(loads);
+      if (strains) add_motion_of_error(contact);
+    }
+    const auto fields = extents_.all();
+    for (std::size_t i = 0; i < fields.size(); ++i) worst[i] = std::max(worst[i], fields[i]->tried);
+  }
+  const auto fields = extents_.all();
+  for (std::size_t i = 0; i < fields.size(); ++i) fields[i]->tried = worst[i];
 }
 
 // Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run

@@ -202,8 +202,11 @@ class Stepper {
   StepInputs complete(const StepLoads& loads, const ContactSolution<d>& contact);
   StepInputs inputs(const StepLoads& loads, const ContactSolution<d>& contact) const;
   Balances refine(const StepLoads& loads, Balances balances, ContactSolution<d>& contact);
-  bool correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool apply);
-  void correct_heat(const StepInputs& inputs, const Balances& balances, bool apply);
+  bool correct_motion(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact,
+                      std::optional<int> sample = {});
+  void correct_heat(const StepInputs& inputs, const Balances& balances, std::optional<int> sample = {});
+  void estimate(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool moved, bool warmed);
+  void forget_errors();
   static void note(double& error, Extent& field, double change, double size, double least);
   bool respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting, ContactSolution<d>& contact);
   double change_at_rest(const Eigen::VectorXd& cause, const ContactSolution<d>& contact);
@@ -213,9 +216,10 @@ class Stepper {
   Eigen::VectorXd rounding(const Eigen::VectorXd& velocity) const;
   Eigen::VectorXd sliding(Vec w) const;
   void note_temperature(const Balances& balances);
-  void coupled_heat_defect(const StepInputs& inputs, bool with_rounding);
+  void coupled_heat_defect(const StepInputs& inputs, std::optional<int> sample);
   Balances balances_of(const StepLoads& loads, const ContactSolution<d>& contact);
   void add_heat_of_error(const StepLoads& loads);
+  void add_motion_of_error(const ContactSolution<d>& contact);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   void hold(Vec v, Vec given) const;

@@ -33,7 +33,7 @@ HALVINGS = 8  # of the first block of graded steps
 EXPONENTS = {2: (2.2, 3.0), 3: (4.0, 6.0)}  # of cells an axis, in the cost of a step and of a factorization
 MESHES, STEPS = ("uniform", "graded"), ("equal", "graded", "adaptive")
 LONGEST = 16  # longest steps of an adaptive clock
-LARGEST = {2: 1024, 3: 64}  # cells along the shortest side that are considered
+LEAST, LARGEST = {2: 8, 3: 4}, {2: 1024, 3: 64}  # cells along the shortest side that are considered
 MOST_STEPS = 100_000
 MOST_PILOT_CELLS = 100_000
 
@@ -312,7 +312,7 @@ class Pilots:
         else:
             side = min(self._unit)
             sizes = sorted({base * 2**i for base in range(4, 8) for i in range(9) if base * 2**i * side <= LARGEST[d]})
-            sizes = [n for n in sizes if n % 2 == 0 and n * side >= 8 and self.gradable(mesh, n)]
+            sizes = [n for n in sizes if n % 2 == 0 and n * side >= LEAST[d] and self.gradable(mesh, n)]
             if self._undamped:  # so that the run has a companion on half of them
                 sizes = [n for n in sizes if self.gradable(mesh, n // 2)]
         counts = sorted({4 * max(2, round(2 ** (i / 3))) for i in range(45)})
