@@ -101,7 +101,8 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
     WARMSLIP_PETSC(VecScale(change_u, systems_->k));
-    const StressSize there = stress_size(layout_, problem_, next_.shape(), next_.straining());
+    const bool known = sample && *sample > 0;
+    const StressSize there = known ? StressSize{} : stress_size(layout_, problem_, next_.shape(), next_.straining());
     note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
          1e-8 * there.possible);
     extents_.force = std::max(extents_.force, balances.force_scale);
@@ -380,13 +381,15 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   return balances;
 }
 
-// Estimates the errors of the motion and of the temperature, and what either makes of the other.
+// Estimates the errors of the motion and of the temperature, and what either makes of the other. One sample of rounding
+// is enough where it leaves ten digits of every field.
 template <int d>
 void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool moved,
                           bool warmed) {
   evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
   forget_errors();
   std::array<double, 4> worst{};
+  const auto doubtful = [](const Extent* field) { return !(field->tried <= 1e-10 * field->size); };
   for (int sample = 0; sample < rounding_samples; ++sample) {
     for (Extent* field : extents_.all()) field->tried = 0;
     if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, sample);
@@ -400,6 +403,7 @@ void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, Cont
     }
     const auto fields = extents_.all();
     for (std::size_t i = 0; i < fields.size(); ++i) worst[i] = std::max(worst[i], fields[i]->tried);
+    if (std::none_of(fields.begin(), fields.end(), doubtful)) break;
   }
   const auto fields = extents_.all();
   for (std::size_t i = 0; i < fields.size(); ++i) fields[i]->tried = worst[i];
