@@ -97,6 +97,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   }
   note(errors_.u, extents_.u, systems_->k * std::max(largest_entry(correction_w_), crept),
        std::max(largest_entry(next_.u), largest_entry(now_.u)), balances.displacement_scale);
+  if (sample) add_drift(motions);
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
@@ -128,6 +129,20 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     }
   }
   return true;
+}
+
+// Adds what a body without supports drifts: the rounding of constant loads is the same in every step, and moves it by
+// half the square of their number. Along motions that contact resists there is no drift.
+template <int d>
+void Stepper<d>::add_drift(const Eigen::VectorXd& motions) {
+  if (motions.size() == 0 || !operators_.inertia) return;
+  const Eigen::VectorXd alone = systems_->rigid.alone(rigid_load_);
+  const Eigen::VectorXd free = (motions.array().abs() >= 0.1 * alone.array().abs()).select(motions, 0.0);
+  const Vec drift = momentum_right_;
+  WARMSLIP_PETSC(VecSet(drift, 0));
+  systems_->rigid.carry(free, drift);
+  const double steps = steps_so_far();
+  extents_.u.tried += systems_->k * largest_entry(drift) * (0.5 * steps * steps);
 }
 
 // The defect of the heat equation of a monolithic step, in heat_right_. Conduction warms no part as a whole: what its
@@ -170,6 +185,11 @@ void Stepper<d>::correct_heat(const StepInputs& inputs, const Balances& balances
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note_temperature(balances);
+  if (sample && !systems_->constants.empty() && !operators_.exchange &&
+      !reactive()) {  // it drifts with the heat it gets
+    const Eigen::VectorXd drift = systems_->constants.alone(systems_->constants.of(heat_external_));
+    extents_.theta.tried += largest_entry(drift) * steps_so_far();
+  }
   if (!sample) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
 

@@ -23,6 +23,8 @@ enum class Outcome {
 
 /// The reason of the outcome `not_finite`.
 inline constexpr const char* beyond_doubles = "a number overflowed; scale the data";
+inline constexpr const char* squares_gone =
+    "forces or velocities of friction are so small or so large that squares of them are no numbers; scale the data";
 
 struct StepperOptions {
   double k;  ///< time step, until `set_step` changes it
@@ -61,6 +63,7 @@ struct Extent {
 struct FieldExtents {
   Extent u, theta, stress, contact_force;
   double force = 0;                                  ///< the largest nodal force so far
+  double looked = 0;                                 ///< the size of u when the stress was looked at last
   Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< the largest displacement of a contact point so far, by axis
 
   std::array<Extent*, 4> all() { return {&u, &theta, &stress, &contact_force}; }
@@ -207,6 +210,9 @@ class Stepper {
   void correct_heat(const StepInputs& inputs, const Balances& balances, std::optional<int> sample = {});
   void estimate(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool moved, bool warmed);
   void forget_errors();
+  void note_sizes(const ContactSolution<d>& contact);
+  void settle_rest();
+  double steps_so_far() const;
   static void note(double& error, Extent& field, double change, double size, double least);
   bool respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting, ContactSolution<d>& contact);
   double change_at_rest(const Eigen::VectorXd& cause, const ContactSolution<d>& contact);
@@ -220,6 +226,7 @@ class Stepper {
   Balances balances_of(const StepLoads& loads, const ContactSolution<d>& contact);
   void add_heat_of_error(const StepLoads& loads);
   void add_motion_of_error(const ContactSolution<d>& contact);
+  void add_drift(const Eigen::VectorXd& motions);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   void hold(Vec v, Vec given) const;
@@ -229,6 +236,7 @@ class Stepper {
   bool measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const;
   bool iterative() const;
   bool in_range(const Eigen::VectorXd& values) const;
+  bool squares_vanish(const StepLoads& loads, const ContactSolution<d>& contact) const;
   int substitutions() const;
 
   const Layout<d>& layout_;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -23,16 +24,12 @@ TIMES = 16  # at which data that depend on time are looked at
 
 def before(d: Discretisation) -> list[str]:
     """All warnings before the first step. Nothing of functions in Python, which are not asked without need."""
-    return [
-        *plausible_data.of_mesh(d.scene),
-        *([] if "loads" in d.user_functions else plausible_data.of_scene(d.scene)),
-        *_gaps(d),
-        *load_kinks(d),
-        *_starts(d),
-        *_warm_corners(d),
-        *_missing(d),
-        *_coupling(d),
-    ]
+    found = plausible_data.of_mesh(d.scene)
+    found += [] if "loads" in d.user_functions else plausible_data.of_scene(d.scene)
+    for warnings in (_gaps, load_kinks, _starts, _warm_corners, _missing, _coupling):
+        with suppress(ArithmeticError):  # of data whose squares are no numbers nothing can be said
+            found += warnings(d)
+    return found
 
 
 def _missing(d: Discretisation) -> list[str]:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -211,3 +212,33 @@ def test_the_largest_pressure_on_a_curved_part_is_that_of_a_node() -> None:
     stated = summary(simulation)["largest"]["pressure"]
     assert stated == pytest.approx(mean, rel=0.05)
     assert single.max() > 1.9 * stated
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {
+            "heat": {"conductivity": 1e160, "capacity": 1e160},
+            "contact": {"part": "bottom", "heat_exchange": {"conductance": 1e160, "foundation_temperature": 10.0}},
+        },
+        {
+            "mesh": {"n": 4, "lengths": [1e90, 1e90]},
+            "elasticity": {"young": 1.0, "poisson": 0.3, "assumption": "plane_strain"},
+            "viscosity": {"young": 1.0, "poisson": 0.3, "assumption": "plane_strain"},
+            "inertia": {"density": 1e-180},
+            "supports": {"displacement": ["top"]},
+            "heat": {
+                "conductivity": 1e180,
+                "capacity": 1.0,
+                "expansion": {"tensor": 1e-3},
+                "heating": {"tensor": -1e-3},
+            },
+            "initial": {"temperature": 1.0},
+        },
+    ],
+    ids=["conductance", "coupling"],
+)
+def test_a_warning_that_cannot_be_computed_ends_no_run(tables: dict[str, Any]) -> None:
+    """Squares of the data overflow in the warnings alone."""
+    result = warmslip.run(build({"mesh": {"n": 4}, "time": {"end": 1.0, "steps": 4}} | tables))
+    assert result.outcome == "completed" and result.summary["steps"] == 4
