@@ -51,8 +51,9 @@ void bind(py::module_& m) {
   matrix("heating", &O::heating, "e(w, eta)");
   matrix("exchange", &O::exchange, "int k_c theta eta over Gamma_C");
   operators.def_property_readonly(
-      "reference", [](const O& o) { return share(o.reference); },
-      "m(reference temperature, v), a vector; None where that is 0");
+      "reference", [](const O& o) { return o.common_reference == 0 ? share(o.reference) : nullptr; },
+      "m(reference temperature, v), a vector that is a load; None where that is 0 or the same in all regions, and the "
+      "stepper knows it");
   m.def(
       "momentum_matrix",
       [](const L& l, const Problem<d>& p, const O& o, double k) { return release(momentum_matrix<d>(l, p, o, k)); },

@@ -433,7 +433,7 @@ class Operators2:
     @property
     def reference(self) -> petsc4py.PETSc.Vec | None:
         """
-        m(reference temperature, v), a vector; None where that is 0
+        m(reference temperature, v), a vector that is a load; None where that is 0 or the same in all regions, and the stepper knows it
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat | None:
@@ -599,7 +599,7 @@ class Operators3:
     @property
     def reference(self) -> petsc4py.PETSc.Vec | None:
         """
-        m(reference temperature, v), a vector; None where that is 0
+        m(reference temperature, v), a vector that is a load; None where that is 0 or the same in all regions, and the stepper knows it
         """
     @property
     def viscosity(self) -> petsc4py.PETSc.Mat | None:

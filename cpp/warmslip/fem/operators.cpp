@@ -151,9 +151,11 @@ Operators<d>::Operators(const Layout<d>& layout, const Problem<d>& problem) {
   if (has(&M::expansion))
     expansion =
         assemble(layout, problem, d, 1, [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.expansion)); });
-  if (std::any_of(problem.materials.begin(), problem.materials.end(),
-                  [](auto& m) { return m.expansion && m.reference != 0; }))
-    reference = reference_force(layout, problem);
+  std::set<double> references;
+  for (const M& m : problem.materials)
+    if (m.expansion) references.insert(m.reference);
+  if (!references.empty() && references != std::set{0.0}) reference = reference_force(layout, problem);
+  if (references.size() == 1) common_reference = *references.begin();
   if (has(&M::heating))
     heating = assemble(layout, problem, 1, d,
                        [](const S& s, const M& m) { return coupling<d>(s, or_zero(m.heating)).transpose().eval(); });

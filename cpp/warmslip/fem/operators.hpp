@@ -16,17 +16,20 @@ template <int d>
 struct Operators {
   Operators(const Layout<d>& layout, const Problem<d>& problem);
 
-  MatHandle inertia;                              ///< rho (w, v), one scalar matrix for all components
-  MatHandle springs;                              ///< int v . S u over parts on springs
-  MatHandle dashpots;                             ///< int v . S w over parts on dashpots
-  MatHandle elasticity;                           ///< a(u, v), springs included
-  MatHandle viscosity;                            ///< b(w, v), dashpots included
-  MatHandle mass;                                 ///< (theta, eta) times the capacity, lumped where the problem says so
-  MatHandle conductivity;                         ///< d(theta, eta)
-  MatHandle expansion;                            ///< m(theta, v): rows v, columns theta
-  MatHandle heating;                              ///< e(w, eta): rows eta, columns w
-  MatHandle exchange;                             ///< int k_c theta eta over Gamma_C, as the mass
-  VecHandle reference;                            ///< m(reference temperature, v); null where that is 0
+  MatHandle inertia;       ///< rho (w, v), one scalar matrix for all components
+  MatHandle springs;       ///< int v . S u over parts on springs
+  MatHandle dashpots;      ///< int v . S w over parts on dashpots
+  MatHandle elasticity;    ///< a(u, v), springs included
+  MatHandle viscosity;     ///< b(w, v), dashpots included
+  MatHandle mass;          ///< (theta, eta) times the capacity, lumped where the problem says so
+  MatHandle conductivity;  ///< d(theta, eta)
+  MatHandle expansion;     ///< m(theta, v): rows v, columns theta
+  MatHandle heating;       ///< e(w, eta): rows eta, columns w
+  MatHandle exchange;      ///< int k_c theta eta over Gamma_C, as the mass
+  VecHandle reference;     ///< m(reference temperature, v); null where that is 0
+  /// The reference temperature where all regions that expand have one: what they expand by is then computed from its
+  /// difference to theta, which has no rounding of the two. Else 0, and the `reference` is a load.
+  double common_reference = 0;
   std::vector<PetscInt> prescribed_displacement;  ///< global scalar indices with given displacement, owned by this rank
   /// Nodes that are held in directions beside the axes, the same on every rank; `held` leaves out what is prescribed by
   /// component.

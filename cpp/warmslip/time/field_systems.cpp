@@ -29,7 +29,12 @@ void Stepper<d>::products(TimeLevel& level) const {
   multiply(operators_.inertia, level.w, level.momentum);
   if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
   multiply(operators_.mass, level.theta, level.mass_theta);
-  if (level.expansion_theta) multiply(operators_.expansion, level.theta, level.expansion_theta);
+  if (level.expansion_theta) {
+    const double from = operators_.common_reference;
+    if (from != 0) WARMSLIP_PETSC(VecCopy(level.theta, warmer_));
+    if (from != 0) WARMSLIP_PETSC(VecShift(warmer_, -from));
+    multiply(operators_.expansion, from != 0 ? warmer_ : level.theta, level.expansion_theta);
+  }
   std::array<double, 4> largest{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
                                 largest_here(level.theta)};
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
@@ -70,6 +75,7 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
     less(operators_.elasticity, k, loads.support_velocity);
   }
   if (monolithic() && loads.support_temperature) less(operators_.expansion, -1, loads.support_temperature);
+  if (monolithic() && operators_.common_reference != 0) WARMSLIP_PETSC(VecAXPY(out, -1, operators_.reference));
   hold(out, loads.support_velocity);
 }
 

@@ -57,7 +57,9 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       const Point<d> external = inertia - load + contact_here, left = external + viscous + elastic - expansion;
       const auto row = [i](const Eigen::VectorXd& rows) { return rows.size() ? rows[i] : 0; };
       const auto size = [](const Point<d>& p) { return p.cwiseAbs().maxCoeff(); };
-      const double given = size(load) + size(contact_here), expands = size(expansion),
+      // of a warm body too the forces of its temperature count, not of its difference to that of reference alone
+      const double given = size(load) + size(contact_here),
+                   expands = std::max(size(expansion), std::abs(operators_.common_reference) * row(expansion_rows_)),
                    stretches = std::max(size(elastic), size(viscous)),
                    moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
                    within = u * row(elastic_rows_) + w * row(viscous_rows_),

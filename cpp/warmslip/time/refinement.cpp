@@ -401,17 +401,20 @@ Balances Stepper<d>::refine(const StepLoads& loads, Balances balances, ContactSo
   return balances;
 }
 
-// Estimates the errors of the motion and of the temperature, and what either makes of the other. One sample of rounding
-// is enough where it leaves ten digits of every field.
+// Estimates the errors of the motion and of the temperature, and what either makes of the other. The first sample of
+// rounding decides whether a run stops, as it is likely to be; the worst one is in the digits. One is enough where it
+// leaves ten digits of every field.
 template <int d>
 void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact, bool moved,
                           bool warmed) {
   evaluator_.store_magnitudes(now_, next_, inputs(loads, contact));
   forget_errors();
-  std::array<double, 4> worst{};
+  const auto fields = extents_.all();
   const auto doubtful = [](const Extent* field) { return !(field->tried <= 1e-10 * field->size); };
+  std::array<double, 4> worst{};
+  Errors likely;
   for (int sample = 0; sample < rounding_samples; ++sample) {
-    for (Extent* field : extents_.all()) field->tried = 0;
+    for (Extent* field : fields) field->tried = 0;
     if (moved && !undetermined_) undetermined_ = !correct_motion(loads, balances, contact, sample);
     if (undetermined_) errors_ = {.theta = monolithic() ? Errors::unknown : errors_.theta};
     if (warmed) correct_heat(inputs(loads, contact), balances, sample);
@@ -421,11 +424,11 @@ void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, Cont
       if (systems_->heat) add_heat_of_error(loads);
       if (strains) add_motion_of_error(contact);
     }
-    const auto fields = extents_.all();
     for (std::size_t i = 0; i < fields.size(); ++i) worst[i] = std::max(worst[i], fields[i]->tried);
-    if (std::none_of(fields.begin(), fields.end(), doubtful)) break;
+    if (sample == 0 || undetermined_) likely = errors_;
+    if (undetermined_ || std::none_of(fields.begin(), fields.end(), doubtful)) break;
   }
-  const auto fields = extents_.all();
+  errors_ = likely;
   for (std::size_t i = 0; i < fields.size(); ++i) fields[i]->tried = worst[i];
 }
 

@@ -113,6 +113,7 @@ void Stepper<d>::take_vectors() {
   if (!systems_->rigid.empty())
     for (VecHandle* v : {&momentum_external_, &correction_strained_}) *v = layout_.vector(d);
   if (!systems_->constants.empty()) heat_external_ = layout_.vector(1);
+  if (operators_.common_reference != 0) warmer_ = layout_.vector(1);
   if (moves && conducts && options_.coupling == Coupling::monolithic)
     for (VecHandle* v : {&coupled_right_, &coupled_}) *v = layout_.vector(d + 1);
   if (reactive()) {

@@ -252,6 +252,7 @@ class Stepper {
   VecHandle correction_strained_;                // the correction but for a rigid motion
   Eigen::VectorXd correction_force_;             // of the contact points
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for motions solved for apart
+  VecHandle warmer_;                             // the temperature less that of reference
   std::vector<bool> fixed_contact_;              // of the contact nodes, those whose temperature is held
   Eigen::VectorXd drive_;                        // tangential velocity of the foundation at the contact points
   Eigen::VectorXd free_;        // velocity of the contact points without contact force, relative to the foundation
