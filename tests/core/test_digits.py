@@ -272,6 +272,52 @@ def a_place_that_no_force_determines(d: int) -> None:
     assert unplaced(simulation) and summary(simulation)["digits"]["theta"] == 0
 
 
+def hats(simulation: Simulation) -> Any:
+    """The hat functions of the mesh at the contact points of its bottom, (points, nodes)."""
+    d = simulation.discretisation
+    nodes, facets, places = np.asarray(d.mesh.nodes)[:, :-1], d.mesh.parts["bottom"], np.asarray(d.surface.positions)
+    out = np.zeros((len(places), len(nodes)))
+    for row, x in zip(out, places[:, :-1], strict=True):
+        for facet in np.asarray(facets):
+            corners = nodes[facet]
+            shares = np.linalg.solve((corners[1:] - corners[0]).T, x - corners[0])
+            if min(*shares, 1 - shares.sum()) > -1e-12:
+                row[facet] = [1 - shares.sum(), *shares]
+                break
+    return out
+
+
+@check
+def pressures_of_gauss_points_on_a_stiff_foundation(d: int) -> None:
+    """Nothing rubs and all is pressed: pressures are stiffness times depth, so that they are linear along every facet.
+
+    A force that two points of a facet share moves no node, and what rounding of a depth makes of it grows with the stiffness.
+    """
+    for stiffness, least, most in ((1e2, 13, 16), (1e8, 7, 10), (1e14, 0, 4)):
+        simulation = Simulation(
+            scene(
+                d,
+                4 if d == 2 else 2,
+                time={"end": 2.0, "steps": 2},
+                inertia={"density": 1.0},
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"displacement": ["top"]},
+                loads={"body": along(d, "-0.1 * (1 + x**2)", "2e-3 * y")},
+                contact={"part": "bottom", "stiffness": stiffness, "quadrature": "gauss-2"},
+            )
+        )
+        for _ in simulation.steps():
+            pass
+        assert simulation.outcome == "completed", simulation.failure
+        surface = simulation.discretisation.surface
+        pressure = -forces_of(simulation)[:, -1] / np.asarray(surface.weights)
+        assert pressure.min() > 0
+        shape = hats(simulation)
+        linear = shape @ np.linalg.lstsq(shape, pressure, rcond=None)[0]
+        error, stated = np.abs(linear - pressure).max() / pressure.max(), summary(simulation)["digits"]["contact_force"]
+        assert error <= 10 ** (1 - stated) and least <= stated <= most, (stiffness, error, stated)
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 

@@ -115,7 +115,9 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   if (systems_->contact) {
     note(errors_.contact_force, extents_.contact_force, largest_entry(surface_.to_nodes(change.force)),
          largest_entry(surface_.to_nodes(contact.force)), balances.contact_scale);
-    if (!apply) extents_.contact_force.tried = std::max(extents_.contact_force.tried, change_at_rest(cause, contact));
+    if (!apply)
+      extents_.contact_force.tried = std::max(
+          {extents_.contact_force.tried, change_at_rest(cause, contact), change_of_pressure(change.force, contact)});
     correction_force_ = change.force;
     extents_.force = std::max(extents_.force, balances.force_scale);
     if (extents_.force > 0) grazing_ = std::min(1.0, 1e2 * extents_.contact_force.scale / extents_.force);
@@ -273,6 +275,20 @@ double Stepper<d>::change_at_rest(const Eigen::VectorXd& cause, const ContactSol
   double largest = 0;  // friction that turns round changes no force by more than twice what a node bears
   for (Eigen::Index i = 0; i < changed.size(); i += d)
     largest = std::max(largest, std::min(changed.segment<d>(i).maxCoeff(), 2 * borne.segment<d>(i).norm()));
+  return largest;
+}
+
+// The largest change of a normal force at a point whose penetration has a force of its own, on a foundation that is not
+// rigid: where forces can be shared so that no node feels it, a stiff one makes much of the rounding of a penetration.
+template <int d>
+double Stepper<d>::change_of_pressure(const Eigen::VectorXd& change, const ContactSolution<d>& contact) const {
+  double largest = 0;
+  for (Eigen::Index i = 0; surface_.shares() && i < surface_.points(); ++i) {
+    const auto point = static_cast<std::size_t>(i);
+    if (contact.status[point] == Status::open || posed_.law(point).compliance.rigid()) continue;
+    const Point<d> nu = surface_.normals().row(i).transpose(), here = change.segment<d>(i * d);
+    largest = std::max(largest, std::abs(here.dot(nu)));
+  }
   return largest;
 }
 

@@ -215,6 +215,7 @@ class Stepper {
   double steps_so_far() const;
   static void note(double& error, Extent& field, double change, double size, double least);
   bool respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting, ContactSolution<d>& contact);
+  double change_of_pressure(const Eigen::VectorXd& change, const ContactSolution<d>& contact) const;
   double change_at_rest(const Eigen::VectorXd& cause, const ContactSolution<d>& contact);
   Motion motion_of(const ContactSolution<d>& contact) const;
   void undo(const Motion& motion, ContactSolution<d>& contact);
