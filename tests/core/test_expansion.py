@@ -44,6 +44,39 @@ def heated(assumption: str = "plane_strain", theta: float = ROOM, reference: flo
     return build(data).override(**{key.replace("__", "."): value for key, value in keys.items()})
 
 
+@pytest.mark.parametrize("quadrature", ["gauss-2", "gauss-3"])
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_a_contact_feels_differences_alone(coupling: str, quadrature: str) -> None:
+    """With cohesion and Gauss points, in kelvin and from the reference: the rounding of two equal thermal forces is no load."""
+    found = []
+    for zero in (0.0, ROOM):
+        scene = build(
+            {
+                "mesh": {"n": 4},
+                "time": {"end": 10.0, "steps": 5, "coupling": coupling},
+                "elasticity": {"young": YOUNG, "poisson": POISSON, "assumption": "plane_strain"},
+                "supports": {"displacement": ["top"]},
+                "heat": {
+                    "conductivity": 13.5,
+                    "capacity": 1.0,
+                    "expansion": {"alpha": ALPHA, "reference_temperature": zero},
+                },
+                "initial": {"temperature": zero},
+                "contact": {
+                    "part": "bottom",
+                    "stiffness": 1e3 * YOUNG,
+                    "quadrature": quadrature,
+                    "friction": {"coefficient": 0.3, "cohesion": 1e-2 * ALPHA * YOUNG},
+                    "heat_exchange": {"conductance": 10.0, "foundation_temperature": zero + 20.0},
+                },
+            }
+        )
+        done = warmslip.run(scene)
+        assert done.completed, done.summary["failure"]
+        found.append(done.u)
+    assert np.abs(found[1] - found[0]).max() <= 1e-9 * np.abs(found[0]).max() > 0
+
+
 @pytest.mark.parametrize("coupling", COUPLINGS)
 @pytest.mark.parametrize("assumption", BODIES)
 def test_nothing_moves_at_the_reference_temperature(assumption: str, coupling: str) -> None:

@@ -187,8 +187,10 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     times |= {"contact_solver": one.contact, "balances": one.balances}
     seconds = {name: settled(found) for name, found in times.items()}
     cost, operators = simulation.stepper.cost, simulation.discretisation.operators
-    # an estimate of the digits looks at the stress, and at the heat that an error of the velocity makes
-    products -= cost.estimates * ((operators.elasticity is not None) + (operators.heating is not None))
+    # an estimate of the digits looks at the stress, and at what errors of the velocity and of the temperature make of the other
+    products -= cost.estimates * sum(
+        getattr(operators, name) is not None for name in ("elasticity", "heating", "expansion")
+    )
     return (
         chosen
         | {"cells_per_side": full.mesh.counts[0], "unknowns": simulation.discretisation.unknowns}
