@@ -59,14 +59,14 @@ def test_a_contact_feels_differences_alone(coupling: str, quadrature: str) -> No
                 "heat": {
                     "conductivity": 13.5,
                     "capacity": 1.0,
-                    "expansion": {"alpha": ALPHA, "reference_temperature": zero},
+                    "expansion": {"alpha": 1e-5, "reference_temperature": zero},
                 },
                 "initial": {"temperature": zero},
                 "contact": {
                     "part": "bottom",
                     "stiffness": 1e3 * YOUNG,
                     "quadrature": quadrature,
-                    "friction": {"coefficient": 0.3, "cohesion": 1e-2 * ALPHA * YOUNG},
+                    "friction": {"coefficient": 0.3, "cohesion": 1e-2 * YOUNG},
                     "heat_exchange": {"conductance": 10.0, "foundation_temperature": zero + 20.0},
                 },
             }
