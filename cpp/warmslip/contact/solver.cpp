@@ -85,7 +85,8 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   if (rigid_.count() > 0)  // it may have to come to the foundation first
     for (const bool line_search : {true, false})
       attempt(Stage::restart, [&] { return newton_with_spring(problem, line_search, solution); });
-  if (rigid_.count() > 0 && !massive) attempt(Stage::restart, [&] { return newton_with_lent_mass(problem, solution); });
+  if (rigid_.count() > 0 && !massive && !lent_)
+    attempt(Stage::restart, [&] { return newton_with_lent_mass(problem, solution); });
   attempt(Stage::restart, [&] { return newton(problem, false, solution); });
   // again from no force, with other scales of the tangential rows
   for (const double tangential_scale : {1.0, 0.1, 10.0, 0.01})

@@ -12,6 +12,15 @@ void add(Vec out, double factor, Vec v) {
   if (v) WARMSLIP_PETSC(VecAXPY(out, factor, v));
 }
 
+// The sign of the rounding of an unknown in a sample, as if drawn by lot; the mixing is that of MurmurHash3.
+bool is_up(std::uint32_t number, int sample) {
+  if (sample == 0) return ((number * 2654435761u) >> 16 & 1u) != 0;
+  std::uint32_t h = number + 0x9e3779b9u * static_cast<std::uint32_t>(sample);
+  h = (h ^ h >> 16) * 0x85ebca6bu;
+  h = (h ^ h >> 13) * 0xc2b2ae35u;
+  return ((h ^ h >> 16) & 1u) != 0;
+}
+
 }  // namespace
 
 template <int d>
@@ -62,7 +71,6 @@ void BalanceEvaluator<d>::heat_defect(const TimeLevel& before, const TimeLevel& 
 
 template <int d>
 void BalanceEvaluator<d>::add_rounding(int sample, Vec defect, Vec external) const {
-  constexpr std::uint32_t multipliers[rounding_samples] = {2654435761u, 2246822519u, 3266489917u};
   const Eigen::Index block = block_size(defect);
   const Eigen::VectorXd &magnitudes = block == 1 ? heat_magnitudes_ : force_magnitudes_,
                         &outer = block == 1 ? heat_external_ : force_external_;
@@ -71,7 +79,7 @@ void BalanceEvaluator<d>::add_rounding(int sample, Vec defect, Vec external) con
     for (PetscInt i = 0; i < layout_.owned(); ++i)
       for (Eigen::Index a = 0; a < block; ++a) {
         const auto number = static_cast<std::uint32_t>(layout_.global_nodes()[static_cast<std::size_t>(i)] * 3 + a);
-        const double sign = ((number * multipliers[sample]) >> 16 & 1u) != 0 ? 0.5 : -0.5;
+        const double sign = is_up(number, sample) ? 0.5 : -0.5;
         (*values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * magnitudes[i * block + a];
         if (external)
           (*outer_values)[i * block + a] += sign * std::numeric_limits<double>::epsilon() * outer[i * block + a];

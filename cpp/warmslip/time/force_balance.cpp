@@ -39,7 +39,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
                w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta;
-  const bool warm = theta > temperature_of_rounding(before, after, in.k);
+  const bool warm =
+      std::max(theta, std::abs(operators_.common_reference)) > temperature_of_rounding(before, after, in.k);
   {
     Values m1(after.momentum), m0(before.momentum), f(in.force), e1(after.elastic_u), e0(before.elastic_u),
         b(viscous_w_), g(in.expansion_theta), c(contact_force_), velocity(after.w), s1(after.shape()),

@@ -97,7 +97,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
   }
   note(errors_.u, extents_.u, systems_->k * std::max(largest_entry(correction_w_), crept),
        std::max(largest_entry(next_.u), largest_entry(now_.u)), balances.displacement_scale);
-  if (sample) add_drift(motions);
+  if (sample) add_drift(motions, now_.contact_force.isZero(0) && !contact.force.isZero(0));
   if (next_.elastic_u || operators_.viscosity) {
     const Vec change_w = correction_strained_ ? correction_strained_ : correction_w_, change_u = momentum_right_;
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
@@ -134,17 +134,21 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
 }
 
 // Adds what a body without supports drifts: the rounding of constant loads is the same in every step, and moves it by
-// half the square of their number. Along motions that contact resists there is no drift.
+// half the square of their number. Contact that leaves a part r of a motion in every step leaves r / (1 - r) of all. In
+// a step that touches after one that did not, the drift before is over.
 template <int d>
-void Stepper<d>::add_drift(const Eigen::VectorXd& motions) {
+void Stepper<d>::add_drift(const Eigen::VectorXd& motions, bool lands) {
   if (motions.size() == 0 || !operators_.inertia) return;
-  const Eigen::VectorXd alone = systems_->rigid.alone(rigid_load_);
-  const Eigen::VectorXd free = (motions.array().abs() >= 0.1 * alone.array().abs()).select(motions, 0.0);
+  const double all = 0.5 * (taken_ + 1.0) * (taken_ + 1.0);
+  Eigen::VectorXd drifts = systems_->rigid.alone(rigid_load_);
+  for (Eigen::Index i = 0; i < drifts.size(); ++i) {
+    const double alone = std::abs(drifts[i]), left = std::min(std::abs(motions[i]), alone);
+    drifts[i] *= lands || left == alone ? all : std::min(all, left / (alone - left));
+  }
   const Vec drift = momentum_right_;
   WARMSLIP_PETSC(VecSet(drift, 0));
-  systems_->rigid.carry(free, drift);
-  const double steps = steps_so_far();
-  extents_.u.tried += systems_->k * largest_entry(drift) * (0.5 * steps * steps);
+  systems_->rigid.carry(drifts, drift);
+  extents_.u.tried += systems_->k * largest_entry(drift);
 }
 
 // The defect of the heat equation of a monolithic step, in heat_right_. Conduction warms no part as a whole: what its
@@ -187,10 +191,11 @@ void Stepper<d>::correct_heat(const StepInputs& inputs, const Balances& balances
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(flow_.given.size());
   solve_heat(heat_right_, heat_external_, none, none, correction_theta_);
   note_temperature(balances);
-  if (sample && !systems_->constants.empty() && !operators_.exchange &&
-      !reactive()) {  // it drifts with the heat it gets
-    const Eigen::VectorXd drift = systems_->constants.alone(systems_->constants.of(heat_external_));
-    extents_.theta.tried += largest_entry(drift) * steps_so_far();
+  const bool keeps = !systems_->constants.empty() && !operators_.exchange && flow_.lost.isZero(0);
+  if (sample && keeps) {  // it drifts with the heat it gets
+    const Eigen::VectorXd drift = (taken_ + 1.0) * systems_->constants.alone(systems_->constants.of(heat_external_));
+    extents_.theta.tried += largest_entry(drift);
+    systems_->constants.carry(drift, correction_theta_);
   }
   if (!sample) WARMSLIP_PETSC(VecAXPY(next_.theta, 1, correction_theta_));
 }
@@ -442,7 +447,9 @@ void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, Cont
     }
     for (std::size_t i = 0; i < fields.size(); ++i) worst[i] = std::max(worst[i], fields[i]->tried);
     if (sample == 0 || undetermined_) likely = errors_;
-    if (undetermined_ || std::none_of(fields.begin(), fields.end(), doubtful)) break;
+    int more = !undetermined_ && std::any_of(fields.begin(), fields.end(), doubtful);
+    MPI_Bcast(&more, 1, MPI_INT, 0, layout_.comm());
+    if (more == 0) break;
   }
   errors_ = likely;
   for (std::size_t i = 0; i < fields.size(); ++i) fields[i]->tried = worst[i];

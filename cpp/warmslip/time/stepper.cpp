@@ -386,12 +386,6 @@ void Stepper<d>::settle_rest() {
   if (rests || cold) take_state();
 }
 
-// Steps of the present size to the end of the one that is being taken.
-template <int d>
-double Stepper<d>::steps_so_far() const {
-  return std::max(1.0, (time_ + systems_->k) / systems_->k);
-}
-
 template <int d>
 void Stepper<d>::revert() {
   if (!before_) throw std::invalid_argument("there is no step that could be taken back");

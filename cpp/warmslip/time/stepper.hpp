@@ -212,7 +212,6 @@ class Stepper {
   void forget_errors();
   void note_sizes(const ContactSolution<d>& contact);
   void settle_rest();
-  double steps_so_far() const;
   static void note(double& error, Extent& field, double change, double size, double least);
   bool respond(const Eigen::VectorXd& correction, const std::vector<bool>& resting, ContactSolution<d>& contact);
   double change_of_pressure(const Eigen::VectorXd& change, const ContactSolution<d>& contact) const;
@@ -227,7 +226,7 @@ class Stepper {
   Balances balances_of(const StepLoads& loads, const ContactSolution<d>& contact);
   void add_heat_of_error(const StepLoads& loads);
   void add_motion_of_error(const ContactSolution<d>& contact);
-  void add_drift(const Eigen::VectorXd& motions);
+  void add_drift(const Eigen::VectorXd& motions, bool lands);
   void split(Vec coupled, Vec w, Vec theta) const;
   void join(Vec momentum, Vec heat, Vec coupled) const;
   void hold(Vec v, Vec given) const;

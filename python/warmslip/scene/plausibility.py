@@ -202,7 +202,7 @@ UNDETERMINED = (
 def rounded(errors: dict[str, float]) -> list[str]:
     """Of the estimated relative errors of fields, dimensionless."""
     return [
-        f"{field} keeps {max(0, int(-np.log10(error)))} of its digits, fewer than the four of other fields: {why}"
+        f"{field} keeps {max(0, int(-np.log10(min(error, 1.0))))} of its digits, fewer than the four of other fields: {why}"
         for (field, why), error in ((SMALL[name], error) for name, error in errors.items())
         if error > 1e-4
     ]
