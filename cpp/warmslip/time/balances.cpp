@@ -10,23 +10,27 @@ namespace warmslip {
 
 template <int d>
 BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-                                      const ContactSurface<d>& surface)
+                                      const ContactSurface<d>& surface, const BalanceEvaluator* like)
     : layout_(layout),
       problem_(problem),
       operators_(operators),
       surface_(surface),
-      elastic_rows_(row_sizes(operators.elasticity)),
-      viscous_rows_(row_sizes(operators.viscosity)),
-      expansion_rows_(row_sizes(operators.expansion)),
-      spring_rows_(row_sizes(operators.springs)),
-      dashpot_rows_(row_sizes(operators.dashpots)),
-      mass_rows_(row_sizes(operators.mass)),
-      conduction_rows_(row_sizes(operators.conductivity)),
-      exchange_rows_(row_sizes(operators.exchange)),
-      heating_rows_(row_sizes(operators.heating)),
       unknowns_(surface.unknowns(d)),
       nodes_(surface.global_nodes()) {
-  if (operators.inertia) {  // its entries are positive
+  using Self = BalanceEvaluator;
+  for (const auto& [a, rows] :
+       {std::pair{Mat(operators.elasticity), &Self::elastic_rows_},
+        std::pair{Mat(operators.viscosity), &Self::viscous_rows_},
+        std::pair{Mat(operators.expansion), &Self::expansion_rows_},
+        std::pair{Mat(operators.springs), &Self::spring_rows_},
+        std::pair{Mat(operators.dashpots), &Self::dashpot_rows_}, std::pair{Mat(operators.mass), &Self::mass_rows_},
+        std::pair{Mat(operators.conductivity), &Self::conduction_rows_},
+        std::pair{Mat(operators.exchange), &Self::exchange_rows_},
+        std::pair{Mat(operators.heating), &Self::heating_rows_}})
+    this->*rows = like ? like->*rows : row_sizes(a);
+  if (like) {
+    inertia_rows_ = like->inertia_rows_;
+  } else if (operators.inertia) {  // its entries are positive
     const VecHandle ones = layout.vector(d), sums = layout.vector(d);
     WARMSLIP_PETSC(VecSet(ones, 1));
     multiply(operators.inertia, ones, sums);
@@ -75,7 +79,10 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   }
   heat_magnitudes_ = heat_external_ = Eigen::VectorXd::Zero(layout.owned());
   force_magnitudes_ = force_external_ = Eigen::VectorXd::Zero(layout.owned() * d);
-  find_shape_functions();
+  if (like)
+    shape_ = like->shape_;
+  else
+    find_shape_functions();
 }
 
 template <int d>

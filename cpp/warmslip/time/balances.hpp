@@ -14,8 +14,9 @@ constexpr int rounding_samples = 3;
 template <int d>
 class BalanceEvaluator {
  public:
+  /// Of another problem with the same operators, a `like` one has their row sums and the hat functions.
   BalanceEvaluator(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
-                   const ContactSurface<d>& surface);
+                   const ContactSurface<d>& surface, const BalanceEvaluator* like = nullptr);
 
   /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
   void rigid_share(double share) { rigid_share_ = share; }

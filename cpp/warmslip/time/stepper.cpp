@@ -52,7 +52,7 @@ Stepper<d>::Stepper(const Problem<d>& problem, const Stepper& like)
       operators_(like.operators_),
       surface_(like.surface_),
       options_(like.options_),
-      evaluator_(layout_, problem, operators_, surface_),
+      evaluator_(layout_, problem, operators_, surface_, &like.evaluator_),
       cache_(like.cache_) {
   if (problem.contact_heats() != like.problem_.contact_heats())
     throw std::invalid_argument("a stepper can share its factors where contact heats in both problems or in none");
