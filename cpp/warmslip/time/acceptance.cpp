@@ -1,4 +1,5 @@
 // Whether a step becomes the state, and the reason where it does not.
+#include <algorithm>
 #include <cmath>
 
 #include "warmslip/time/stepper.hpp"
@@ -18,6 +19,19 @@ Outcome Stepper<d>::outcome_of(const Balances& l) const {
     return Outcome::not_finite;
   if (!closed(l)) return Outcome::balance_violated;
   return weighed().largest() <= options_.error_bound ? Outcome::completed : Outcome::precision_lost;
+}
+
+// Whether friction is so large, or was so small in the whole run, that squares of it have no digits.
+template <int d>
+bool Stepper<d>::squares_vanish(const StepLoads& loads, const ContactSolution<d>& contact) const {
+  constexpr double large = 1e140, small = 1 / large;
+  const bool rubs =
+      std::any_of(posed_.laws.begin(), posed_.laws.end(), [](auto& law) { return law.friction.present(); });
+  const double force = rubs && contact.force.size() > 0 ? contact.force.template lpNorm<Eigen::Infinity>() : 0;
+  if (force == 0) return false;
+  const double free = free_.template lpNorm<Eigen::Infinity>(), so_far = std::max(force, extents_.contact_force.size);
+  if (std::max(force, free) > large) return true;
+  return loads.measured && (so_far < small || (force > 1e-10 * so_far && free > 0 && free < small));
 }
 
 // Whether PETSc's options put an iterative solver in the place of a factorization.

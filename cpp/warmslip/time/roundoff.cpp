@@ -40,4 +40,12 @@ Eigen::VectorXd row_sizes(Mat a) {
   return sizes.reshaped(block, sizes.size() / block).colwise().maxCoeff().transpose();
 }
 
+double largest_entry(Vec v) {
+  PetscReal value = 0;
+  if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));
+  return value;
+}
+
+double largest_entry(const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0; }
+
 }  // namespace warmslip

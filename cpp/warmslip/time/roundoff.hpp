@@ -33,4 +33,8 @@ std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> la
   return largest;
 }
 
+/// The largest magnitude of an entry (of a distributed vector: collective); 0 of none.
+double largest_entry(Vec v);
+double largest_entry(const Eigen::VectorXd& v);
+
 }  // namespace warmslip

@@ -289,19 +289,6 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   return report;
 }
 
-// Whether friction is so large, or was so small in the whole run, that squares of it have no digits.
-template <int d>
-bool Stepper<d>::squares_vanish(const StepLoads& loads, const ContactSolution<d>& contact) const {
-  constexpr double large = 1e140, small = 1 / large;
-  const bool rubs =
-      std::any_of(posed_.laws.begin(), posed_.laws.end(), [](auto& law) { return law.friction.present(); });
-  const double force = rubs && contact.force.size() > 0 ? contact.force.template lpNorm<Eigen::Infinity>() : 0;
-  if (force == 0) return false;
-  const double free = free_.template lpNorm<Eigen::Infinity>(), so_far = std::max(force, extents_.contact_force.size);
-  if (std::max(force, free) > large) return true;
-  return loads.measured && (so_far < small || (force > 1e-10 * so_far && free > 0 && free < small));
-}
-
 // Accepts or rejects the step; an accepted one becomes the state.
 template <int d>
 StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact) {
@@ -339,42 +326,18 @@ StepReport<d> Stepper<d>::conclude(const StepLoads& loads, const Balances& balan
   return report;
 }
 
-// Few steps estimate errors, and a field may be largest in any. The stress is looked at when u has doubled.
-template <int d>
-void Stepper<d>::note_sizes(const ContactSolution<d>& contact) {
-  const auto grow = [](Extent& field, double size) {
-    field.size = std::max(field.size, size);
-    field.scale = std::max(field.scale, size);
-  };
-  grow(extents_.u, next_.sizes.u);
-  grow(extents_.theta, next_.sizes.theta);
-  if (next_.elastic_u && next_.sizes.u > 2 * extents_.looked) {
-    extents_.looked = next_.sizes.u;
-    grow(extents_.stress, stress_size(layout_, problem_, next_.shape(), next_.straining()).largest);
-  }
-  if (!systems_->contact || contact.force.size() == 0) return;
-  grow(extents_.contact_force, contact.force.template lpNorm<Eigen::Infinity>());
-  const auto motions = next_.contact_u.reshaped(d, surface_.points()).cwiseAbs().rowwise().maxCoeff();
-  extents_.motion.head(d) = extents_.motion.head(d).cwiseMax(motions);
-}
-
 // Sets a motion that has ended, and a temperature, to zero: what is left is rounding of rounding, which would shrink in
 // every step until squares of it are no numbers.
 template <int d>
 void Stepper<d>::settle_rest() {
   constexpr double nothing = 1e-30;  // of the largest value so far
-  const auto largest = [](Vec v) {
-    PetscReal size;
-    WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &size));
-    return size;
-  };
   const auto zero = [](Vec v) {
     if (v) WARMSLIP_PETSC(VecSet(v, 0));
   };
-  const double least = nothing * extents_.u.size, last = now_.theta ? now_.sizes.theta : 0;
-  const bool rests = now_.u && now_.sizes.u + now_.sizes.w > 0 && now_.sizes.u < least &&
-                     systems_->k * now_.sizes.w < least && largest(now_.u)<least, cold = last> 0 &&
-                     last < nothing * extents_.theta.size;
+  const double least = nothing * extents_.u.size;
+  const bool cold = now_.sizes.theta > 0 && now_.sizes.theta < nothing * extents_.theta.size;
+  const bool small = now_.u && now_.sizes.u < least && systems_->k * now_.sizes.w < least;
+  const bool rests = small && now_.sizes.u + now_.sizes.w > 0 && largest_entry(now_.u) < least;
   if (rests) {
     for (Vec v : {Vec(now_.u), Vec(now_.w), Vec(now_.strained), Vec(now_.strained_w)}) zero(v);
     now_.rigid.setZero();

@@ -157,6 +157,12 @@ def test_a_coarse_graded_mesh_in_space_is_found() -> None:
     assert asked.true_error(answer) <= 0.25
 
 
+def test_meshes_in_space_may_be_as_coarse_as_their_pilots() -> None:
+    """In space the next size costs several times as much: four cells along a side are enough for a rough answer."""
+    runs = pilots.Pilots(asked.scene(10), ["u_V"], lambda _: None)
+    assert min(one.cells for one in runs.settings("uniform", "equal")) == 4
+
+
 def test_waves_without_damping_need_three_graded_meshes() -> None:
     """Their errors in space grow with the number of steps, and pilots have few."""
     runs = pilots.Pilots(asked.scene(14), ["u_V"], lambda _: None)
