@@ -232,10 +232,16 @@ Balances Stepper<d>::balance(const StepInputs& inputs) {
 
 template <int d>
 StepReport<d> Stepper<d>::advance(const StepLoads& loads) {
+  const FieldExtents extents_before = extents_;
   try {
     return attempt(loads);
   } catch (const SolveFailed& failure) {  // on all ranks alike
+    extents_ = extents_before;
     return not_taken<d>(Outcome::solver_failed, failure.what());
+  } catch (...) {  // memory ran out: a later try is to find nothing of this one
+    extents_ = extents_before;
+    clear_cache();
+    throw;
   }
 }
 
