@@ -18,7 +18,7 @@ FOLDER = TESTS / "campaign/scenes"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 # judged by the digits that the run states; all others to 1e-6
 STATED = {"setting_off", "slender_and_incompressible", "soft_and_warm", "thin_and_sliding", "thin_and_soft"}
-RANKS = ["free_warm", "gauss_2_moving_support", "regularised_steep", "slender", "solid_gauss"]
+RANKS = ["free_warm", "gauss_2_moving_support", "regularised_steep", "slender", "solid_gauss", "waves_on_the_way_solid"]
 
 
 def well(name: str, simulation: judge.Ran) -> None:

@@ -17,6 +17,9 @@
 // work in a rigid motion, and a rigid motion makes no heat. Where the operator is not symmetric, V and W_c of the
 // second equation belong to its transpose. K is positive definite if and only if K~ and H are, because
 // H = Z^T P (P^-1 - K~^-1) P Z on the springs.
+//
+// In steps so short that waves cross only a part of the body, a spring is not felt beyond it: there, V is all but Z,
+// and K~^-1 b and V a cancel. The mass then holds the motions well, and K is solved with as it is.
 #pragma once
 #include <functional>
 #include <vector>
@@ -48,6 +51,7 @@ class RigidMotions {
                const std::vector<std::string>& avoid, const Eigen::VectorXd& firmness);
 
   bool empty() const { return motions_.empty(); }
+  bool apart() const { return !inner_.empty(); }  ///< whether the motions are solved for apart
   Eigen::Index count() const { return static_cast<Eigen::Index>(motions_.size()); }
   /// K -> K~.
   void add_springs(Mat k);

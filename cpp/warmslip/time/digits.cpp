@@ -95,7 +95,8 @@ template <int d>
 void Stepper<d>::add_drift(const Eigen::VectorXd& motions, bool lands) {
   if (motions.size() == 0 || !operators_.inertia) return;
   const double all = 0.5 * (taken_ + 1.0) * (taken_ + 1.0);
-  Eigen::VectorXd drifts = systems_->rigid.alone(rigid_load_);
+  Eigen::VectorXd drifts =
+      systems_->rigid.alone(systems_->rigid.apart() ? rigid_load_ : systems_->rigid.of(momentum_external_));
   for (Eigen::Index i = 0; i < drifts.size(); ++i) {
     const double alone = std::abs(drifts[i]), left = std::min(std::abs(motions[i]), alone);
     drifts[i] *= lands || left == alone ? all : std::min(all, left / (alone - left));

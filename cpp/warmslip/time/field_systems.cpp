@@ -118,7 +118,7 @@ void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double s
 template <int d>
 Eigen::VectorXd Stepper<d>::reduce(Vec right, Vec external) {
   const Eigen::VectorXd nodal = systems_->momentum->reduce(right);
-  if (!systems_->rigid.empty()) rigid_load_ = systems_->rigid.load(external, right);
+  rigid_load_ = systems_->rigid.apart() ? systems_->rigid.load(external, right) : Eigen::VectorXd();
   return systems_->contact ? surface_.at_points(nodal) : Eigen::VectorXd();
 }
 
@@ -154,17 +154,18 @@ void Stepper<d>::apply_contact_velocity(const ContactSolution<d>& contact, Vec w
 }
 
 // The velocity and, monolithic, the temperature for the right-hand side of the last `reduce` and the forces of the
-// contact. Where rigid motions are solved for apart, `w` lacks them; they are returned.
+// contact. Without supports, `w` lacks the rigid motions, which are returned.
 template <int d>
 Eigen::VectorXd Stepper<d>::expand(const ContactSolution<d>& contact, Vec w, Vec theta) {
   const Vec out = monolithic() ? Vec(coupled_) : w;
   systems_->momentum->expand(systems_->contact ? surface_.to_nodes(contact.force) : Eigen::VectorXd(), out);
   Eigen::VectorXd motions;
-  if (!systems_->rigid.empty()) {
+  if (systems_->rigid.apart()) {
     motions = systems_->contact ? contact.rigid : systems_->rigid.alone(rigid_load_);
     systems_->rigid.strain(motions, out);
   }
   if (monolithic()) split(coupled_, w, theta);
+  if (!systems_->rigid.empty() && !systems_->rigid.apart()) motions = systems_->rigid.remove(w);
   return motions;
 }
 

@@ -7,14 +7,37 @@
 namespace warmslip {
 namespace {
 
-double largest_diagonal(Mat a) {
-  if (!a) return 0;
+VecHandle diagonal_of(Mat a) {
   VecHandle diagonal;
-  PetscReal largest = 0;
   WARMSLIP_PETSC(MatCreateVecs(a, diagonal.out(), nullptr));
   WARMSLIP_PETSC(MatGetDiagonal(a, diagonal));
-  WARMSLIP_PETSC(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return diagonal;
+}
+
+double largest_diagonal(Mat a) {
+  if (!a) return 0;
+  PetscReal largest = 0;
+  WARMSLIP_PETSC(VecNorm(diagonal_of(a), NORM_INFINITY, &largest));
   return largest;
+}
+
+// Whether the mass holds rigid motions to all but three digits: no diagonal entry exceeds a thousand times that of the
+// node's mass.
+bool mass_holds(Mat inertia, double k, int width, Mat a) {
+  if (!inertia) return false;
+  VecHandle ones, masses;
+  WARMSLIP_PETSC(MatCreateVecs(inertia, ones.out(), masses.out()));
+  WARMSLIP_PETSC(VecSet(ones, 1));
+  multiply(inertia, ones, masses);
+  const VecHandle diagonal = diagonal_of(a);
+  const Eigen::Index block = block_size(masses);
+  Values entries(diagonal), held(masses);
+  const Eigen::Index nodes = (*entries).size() / width;
+  int holds =
+      ((*entries).reshaped(width, nodes).topRows(block).array() <= 1e3 / k * (*held).reshaped(block, nodes).array())
+          .all();
+  MPI_Allreduce(MPI_IN_PLACE, &holds, 1, MPI_INT, MPI_LAND, PetscObjectComm(reinterpret_cast<PetscObject>(a)));
+  return holds != 0;
 }
 
 // The largest of a quantity of the materials at every node of the mesh.
@@ -103,18 +126,22 @@ StepSystems<d>::StepSystems(const Layout<d>& layout, const Problem<d>& problem, 
   if (surface.points() == 0) return;
   // forces are shared in many ways, see ContactSolver::shared and minimal_forces
   if (surface.shares()) contact_options.proximal = 1e-6;
-  RigidCoupling apart{Eigen::MatrixXd(surface.points() * d, rigid.count()), {}, rigid.inertia()};
-  apart.loads = carried = apart.motions;
-  for (Eigen::Index j = 0; j < rigid.count(); ++j) {
+  carried.resize(surface.points() * d, rigid.count());
+  for (Eigen::Index j = 0; j < rigid.count(); ++j)
+    carried.col(j) = surface.at_points(surface.nodal_values(rigid.motion(j)));
+  RigidCoupling apart{Eigen::MatrixXd(surface.points() * d, 0), {}, {}};
+  if (rigid.apart()) apart = {carried, {}, rigid.inertia()};
+  apart.loads = apart.motions;
+  for (Eigen::Index j = 0; j < apart.motions.cols(); ++j) {
     apart.motions.col(j) = surface.at_points(surface.nodal_values(rigid.along(j)));
     apart.loads.col(j) = surface.at_points(surface.nodal_values(rigid.along_transposed(j)));
-    carried.col(j) = surface.at_points(surface.nodal_values(rigid.motion(j)));
   }
   contact =
       std::make_unique<ContactSolver<d>>(surface.at_points(momentum->compliance()), contact_options, std::move(apart));
 }
 
-// Factors the operator of the motion, of `width` unknowns a node, with the rigid motions solved for apart.
+// Factors the operator of the motion, of `width` unknowns a node, with the rigid motions solved for apart where the
+// mass does not hold them.
 template <int d>
 void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                                    const ContactSurface<d>& surface, Mat a, int width, Symmetry symmetry,
@@ -129,15 +156,21 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
     throw std::invalid_argument(
         "nothing holds the body: its supports leave it, or a part of it, a rigid motion, and it has no inertia and no "
         "contact; hold one more place or component, or give inertia.density > 0");
-  if (!rigid.empty()) rigid.add_springs(a);
+  const bool apart = !rigid.empty() && !mass_holds(operators.inertia, k, width, a);
+  if (apart) rigid.add_springs(a);
   support_scales = warmslip::support_scales(layout, operators.inclined, a, width);
   momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
   if (rigid.empty()) return;
-  rigid.prepare(*momentum, [&](Vec x, Vec y) {
+  const auto mass = [&](Vec x, Vec y) {
     multiply(operators.inertia, x, y);
     WARMSLIP_PETSC(VecScale(y, 1 / k));
     release(layout, operators.prescribed_displacement, operators.inclined, y);  // a turn about a held node
-  });
+  };
+  if (!apart) {
+    rigid.prepare(mass);
+    return;
+  }
+  rigid.prepare(*momentum, mass);
   if (symmetry == Symmetry::definite_or_refused && !rigid.holds()) throw std::invalid_argument(indefinite_coupling);
 }
 

@@ -12,8 +12,7 @@ constexpr const char* unsupported =
     "nothing was found to hold the body in a step without inertia: it may move and touches nothing, slides freely on "
     "what it touches, or is balanced on its points; give it a support, friction or an [inertia] table";
 
-const std::string no_solution = "no stage of the contact solver reached the law; take smaller steps";
-constexpr const char* short_steps = ", or larger ones where waves cross only a part of the body in one";
+constexpr const char* no_solution = "no stage of the contact solver reached the law; take smaller steps";
 
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>
@@ -77,7 +76,7 @@ void Stepper<d>::set_step(double k) {
     cache_->keep(systems_);
     cost_.factorizations += systems_->factorizations();
   }
-  if (!systems_->rigid.empty()) evaluator_.rigid_share(systems_->rigid.share());
+  if (!systems_->rigid.empty()) evaluator_.rigid_share(systems_->rigid.apart() ? systems_->rigid.share() : 1);
   if (!systems_->constants.empty() && !heat_external_) heat_external_ = layout_.vector(1);
   cost_.factor_bytes = cache_->bytes();
 }
@@ -273,13 +272,10 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
   const bool solved = !systems_->momentum || solve_motion(loads, contact), vanish = squares_vanish(loads, contact);
   if (!solved || vanish) {
     const bool finite = in_range(free_) && !vanish;
-    StepReport<d> report =
-        vanish    ? not_taken<d>(Outcome::not_finite, squares_gone)
-        : !finite ? not_taken<d>(Outcome::not_finite, beyond_doubles)
-        : contact.unsupported
-            ? not_taken<d>(Outcome::unsupported, unsupported)
-            : not_taken<d>(Outcome::contact_not_converged,
-                           no_solution + (systems_->rigid.empty() || !operators_.inertia ? "" : short_steps));
+    StepReport<d> report = vanish                ? not_taken<d>(Outcome::not_finite, squares_gone)
+                           : !finite             ? not_taken<d>(Outcome::not_finite, beyond_doubles)
+                           : contact.unsupported ? not_taken<d>(Outcome::unsupported, unsupported)
+                                                 : not_taken<d>(Outcome::contact_not_converged, no_solution);
     report.stage = contact.stage;
     report.newton_iterations = contact.iterations;
     if (finite) report.balances.law_residual = contact.law_residual;
