@@ -51,7 +51,12 @@ def along(d: int, last: Any, first: Any = 0.0) -> list[Any]:
 
 
 def completed(
-    one: Scene, digits: float = 8.0, *, mesh: Any = None, each: Callable[[Simulation, Any], None] | None = None
+    one: Scene,
+    digits: float = 8.0,
+    *,
+    mesh: Any = None,
+    residual: float = 1e-11,
+    each: Callable[[Simulation, Any], None] | None = None,
 ) -> Simulation:
     """A run that must end right, with so many digits in every field that is more than what rounding makes of the others.
 
@@ -62,7 +67,7 @@ def completed(
         if each is not None:
             each(simulation, report)
     assert simulation.outcome == "completed", (simulation.outcome, simulation.failure)
-    assert max(simulation.statistics.residuals.values()) <= 1e-11, simulation.statistics.residuals
+    assert max(simulation.statistics.residuals.values()) <= residual, simulation.statistics.residuals
     stated = summary.digits(simulation.statistics.errors)
     assert min(stated.values()) >= digits, stated
     return simulation

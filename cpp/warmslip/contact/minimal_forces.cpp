@@ -101,42 +101,28 @@ struct Dual {
   const Eigen::VectorXd& asked;  // (d nodes)
 
   Point<d> at(const Sharing<d>& q, const Eigen::VectorXd& y) const {
-    Point<d> value = Point<d>::Zero();
-    for (Shape::InnerIterator it(shape, q.point); it; ++it) value += it.value() * y.template segment<d>(it.col() * d);
-    return q.weight * value;
-  }
-  double value(const Eigen::VectorXd& y) const {
-    double sum = -asked.dot(y);
-    for (const auto& q : points) {
-      const Point<d> wanted = at(q, y), force = q.nearest(wanted).force;
-      sum += force.dot(wanted - 0.5 * force) / q.weight;
-    }
-    return sum;
+    return q.weight * (shape.middleRows(q.point * d, d) * y);
   }
   Eigen::VectorXd gradient(const Eigen::VectorXd& y) const {
-    Eigen::VectorXd out = -asked;
-    for (const auto& q : points) add(q, q.nearest(at(q, y)).force, out);
-    return out;
+    Eigen::VectorXd forces = Eigen::VectorXd::Zero(shape.rows());
+    for (const auto& q : points) forces.template segment<d>(q.point * d) = q.nearest(at(q, y)).force;
+    return shape.transpose() * forces - asked;
   }
   // its generalised derivative, with something on the diagonal
   Eigen::SparseMatrix<double> curvature(const Eigen::VectorXd& y, double damping) const {
     std::vector<Eigen::Triplet<double>> entries;
     for (const auto& q : points) {
       const Tensor2<d> own = q.weight * q.nearest(at(q, y)).derivative;
-      for (Shape::InnerIterator i(shape, q.point); i; ++i)
-        for (Shape::InnerIterator j(shape, q.point); j; ++j)
-          for (int a = 0; a < d; ++a)
-            for (int b = 0; b < d; ++b)
-              entries.emplace_back(i.col() * d + a, j.col() * d + b, i.value() * j.value() * own(a, b));
+      for (int a = 0; a < d; ++a)
+        for (int b = 0; b < d; ++b)
+          for (Shape::InnerIterator i(shape, q.point * d + a); i; ++i)
+            for (Shape::InnerIterator j(shape, q.point * d + b); j; ++j)
+              entries.emplace_back(i.col(), j.col(), i.value() * j.value() * own(a, b));
     }
     for (Eigen::Index i = 0; i < asked.size(); ++i) entries.emplace_back(i, i, damping);
     Eigen::SparseMatrix<double> out(asked.size(), asked.size());
     out.setFromTriplets(entries.begin(), entries.end());
     return out;
-  }
-  void add(const Sharing<d>& q, const Point<d>& force, Eigen::VectorXd& nodal) const {
-    for (Shape::InnerIterator it(shape, q.point); it; ++it)
-      nodal.template segment<d>(it.col() * d) += it.value() * force;
   }
 };
 
@@ -149,14 +135,15 @@ bool minimal_forces(const ContactProblem<d>& problem, const Shape& shape, double
   if (points.empty()) return true;
   for (const auto& q : points)
     if (q.rests) solution.status[static_cast<std::size_t>(q.point)] = Status::stick;
-  Eigen::VectorXd asked = Eigen::VectorXd::Zero(shape.cols() * d);
-  const Dual<d> dual{points, shape, asked};
+  Eigen::VectorXd shared = Eigen::VectorXd::Zero(shape.rows());
   double max_bound = 0;
   for (const auto& q : points) {
-    const Point<d> force = solution.force.template segment<d>(q.point * d);
-    dual.add(q, q.part(force), asked);
-    max_bound = std::max({max_bound, q.bound, q.part(force).norm()});
+    const Point<d> part = q.part(solution.force.template segment<d>(q.point * d));
+    shared.template segment<d>(q.point * d) = part;
+    max_bound = std::max({max_bound, q.bound, part.norm()});
   }
+  const Eigen::VectorXd asked = shape.transpose() * shared;
+  const Dual<d> dual{points, shape, asked};
   double heaviest = 0;
   for (const auto& q : points) heaviest = std::max(heaviest, q.weight);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(asked.size()), gradient = dual.gradient(y);

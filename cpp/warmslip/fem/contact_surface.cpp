@@ -130,14 +130,14 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   shape_.setFromTriplets(shape.begin(), shape.end());
   scalar_shape_.resize(count, nodes());
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
-  moving_shape_ = scalar_shape_;
-  moving_shape_.prune([&](Eigen::Index, Eigen::Index node, double) { return !fixed[static_cast<std::size_t>(node)]; });
+  moving_shape_ = (shape_ * free_).pruned();
   held_ = Eigen::MatrixXd::Zero(count * d, d);
   for (Eigen::Index q = 0; q < count; ++q) {
-    prescribed_.push_back(moving_shape_.innerVector(q).nonZeros() == 0);
     Tensor2<d> held = Tensor2<d>::Zero();
     bool first = true;  // a direction is held where all nodes about the point hold it
+    prescribed_.push_back(true);
     for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(scalar_shape_, q); entry; ++entry) {
+      if (!fixed[static_cast<std::size_t>(entry.col())]) prescribed_.back() = false;
       const Tensor2<d> here = held_at(nodes_[static_cast<std::size_t>(entry.col())]);
       if (!first && !here.isApprox(held)) held.setZero();
       if (first) held = here;
@@ -146,7 +146,20 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
     if (!prescribed_.back()) held_.template middleRows<d>(q * d) = held;
   }
 
-  shares_ = dependent(moving_shape_);
+  std::vector<Eigen::Triplet<double>> across;  // the directions in which each point is not held
+  int directions = 0;
+  for (Eigen::Index q = 0; q < count; ++q) {
+    const Eigen::SelfAdjointEigenSolver<Tensor2<d>> frame(held_.template middleRows<d>(q * d));
+    for (int a = 0; a < d; ++a)
+      if (!prescribed(q) && frame.eigenvalues()[a] < 0.5) {
+        for (int b = 0; b < d; ++b)
+          across.emplace_back(directions, static_cast<int>(q) * d + b, frame.eigenvectors()(b, a));
+        ++directions;
+      }
+  }
+  Eigen::SparseMatrix<double, Eigen::RowMajor> released(directions, count * d);
+  released.setFromTriplets(across.begin(), across.end());
+  shares_ = dependent(released * moving_shape_);
 
   std::vector<int> touched(static_cast<std::size_t>(nodes()), 0);  // points that a node moves
   for (const auto& entry : scalar_shape) ++touched[static_cast<std::size_t>(entry.col())];

@@ -58,7 +58,8 @@ class ContactSurface {
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
   /// The same for scalars, one value a node and a point: (points, nodes).
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }
-  /// Without the nodes whose displacement is prescribed: forces there move nothing.
+  /// Displacements of the points from nodal ones, (d points, d nodes), without what supports hold: forces on that move
+  /// nothing.
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& moving_shape() const { return moving_shape_; }
   /// Whether forces of the points that move can be shared so that they move nothing.
   bool shares() const { return shares_; }
@@ -73,8 +74,8 @@ class ContactSurface {
   bool shares_ = false;
   Eigen::SparseMatrix<double, Eigen::RowMajor> free_;  // (d nodes, d nodes), projects onto directions that are not held
   Eigen::MatrixXd held_;  // (d points, d), projectors onto the directions in which a point is held and others are free
-  Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_, moving_shape_;
-  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_;  // (d points, d nodes)
+  Eigen::SparseMatrix<double, Eigen::RowMajor> scalar_shape_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape_, moving_shape_;  // (d points, d nodes)
   RealTable<d> positions_, normals_;
   Eigen::VectorXd weights_;
 };
