@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from support.boxes import along, completed, elasticity, field, fields, misses, scene, turned
+from support.boxes import along, body, completed, elasticity, field, fields, misses, scene, turned
 from support.ranked import Checks
 
 from warmslip import _core, discretise
@@ -306,6 +306,29 @@ def weak_and_stiff_springs(d: int) -> None:
     one, mesh = turned(penalty, turn)
     simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
     assert len(list(simulation.steps())) == 4, simulation.failure
+
+
+@check
+def a_hard_inset_of_a_body_on_rollers(d: int) -> None:
+    """A contact bears a body that rollers guide, whatever the stiffness of a part of it: it ends as that of a rigid one."""
+    ends = []
+    for young in (1e6, 1e8, 1e10):
+        hard = {"where": "abs(x - 0.5) < 0.3", "elasticity": elasticity(d, young, 0.0)}
+        one = pressed(
+            d,
+            planes(d),
+            n=[6, *[2] * (d - 1)],
+            mesh=body(d, [6, *[2] * (d - 1)]) | {"lengths": [1.0, *[0.1] * (d - 1)]},
+            elasticity=elasticity(d, 1.0, 0.0),
+            regions={"hard": hard},
+            loads={"body": along(d, -0.0075)},
+            contact={"part": "bottom", "stiffness": 2.0},
+        )
+        simulation = completed(one, digits=4.0)
+        assert simulation.report.normal_force == pytest.approx(0.0075 * 0.1 ** (d - 1), rel=1e-9)
+        ends.append(field(simulation, "u"))
+    for u in ends[1:]:
+        assert np.abs(u - ends[0]).max() <= 1e-5 * np.abs(ends[0]).max()
 
 
 @check

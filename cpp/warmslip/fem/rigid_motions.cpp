@@ -271,6 +271,14 @@ Eigen::VectorXd RigidMotions::remove(Vec x) const {
   return motions;
 }
 
+bool RigidMotions::contains(Vec x) const {
+  PetscReal all, left;
+  WARMSLIP_PETSC(VecNorm(x, NORM_2, &all));
+  remove(x);
+  WARMSLIP_PETSC(VecNorm(x, NORM_2, &left));
+  return left <= 1e-9 * all;
+}
+
 void RigidMotions::carry(const Eigen::VectorXd& motions, Vec x) const { combine(motions_, motions, x); }
 
 template RigidMotions::RigidMotions(const Layout<2>&, int, int, const Resisted&, const std::vector<std::string>&,

@@ -70,6 +70,8 @@ class RigidMotions {
   void strain(const Eigen::VectorXd& motions, Vec inner) const;
   /// x -= the motion that is nearest to it, in the sum of squares over the nodes; its components.
   Eigen::VectorXd remove(Vec x) const;
+  /// Whether a vector is one of the motions, to nine digits (collective); x is overwritten.
+  bool contains(Vec x) const;
   /// Z^T b (collective)
   Eigen::VectorXd of(Vec b) const { return dots(motions_, b); }
   /// x += Z a

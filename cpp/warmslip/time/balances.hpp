@@ -1,6 +1,7 @@
 // The balances every step must close to round-off: energy, heat, force and moment, and the contact law itself.
 // They are computed from the step's result with the un-eliminated operators, not from the solver's own residuals.
 #pragma once
+#include "warmslip/fem/rigid_motions.hpp"
 #include "warmslip/time/roundoff.hpp"
 #include "warmslip/time/time_level.hpp"
 
@@ -18,8 +19,9 @@ class BalanceEvaluator {
   BalanceEvaluator(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                    const ContactSurface<d>& surface, const BalanceEvaluator* like = nullptr);
 
-  /// How much of the inner forces' rounding reaches the rigid motions of a body without supports, in [0, 1].
-  void rigid_share(double share) { rigid_share_ = share; }
+  /// Takes from the system of a step how much of the inner forces' rounding reaches the force and the moment of the
+  /// body: all, but along those of its rigid motions that are solved for apart (collective).
+  void take_shares(const RigidMotions& rigid);
 
   /// The balances of the step from `before` to `after` (collective).
   Balances evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);
@@ -82,7 +84,7 @@ class BalanceEvaluator {
   std::vector<bool> temperature_prescribed_;  // a node
   std::vector<int> support_;                  // of a node in held_, -1 where it is free
   std::vector<Tensor2<d>> held_;              // projectors onto the directions in which the displacement is given
-  double rigid_share_ = 1;
+  Eigen::VectorXd shares_ = Eigen::VectorXd::Ones(d * (d + 1) / 2);  // of forces and moments, see take_shares
   bool stores_magnitudes_ = false;             // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity
   double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature

@@ -14,19 +14,47 @@ template <int d>
 struct Resultant {
   static constexpr int moments = d == 2 ? 1 : 3, many = d + moments;
   Eigen::Vector<double, many> sum = Eigen::Vector<double, many>::Zero(), size = sum;
-  // a force at a place, and the magnitudes of its own terms
-  void add(const Point<d>& x, const Point<d>& f, double magnitude) {
+  // a force at a place, and the magnitudes of its own terms: outer ones, and inner ones that count in part
+  void add(const Point<d>& x, const Point<d>& f, double outer, double inner, const Eigen::VectorXd& shares) {
     sum.template head<d>() += f;
     if constexpr (d == 2)
       sum[2] += x[0] * f[1] - x[1] * f[0];
     else
       sum.template tail<3>() += x.cross(f);
-    size.template head<d>().array() += magnitude;
-    size.template tail<moments>().array() += x.norm() * magnitude;
+    const Eigen::Vector<double, many> magnitude = outer + inner * shares.array();
+    size.template head<d>() += magnitude.template head<d>();
+    size.template tail<moments>() += x.norm() * magnitude.template tail<moments>();
   }
 };
 
+// The motion along a force, or about the axis of a moment, by its place among the resultants.
+template <int d>
+Point<d> motion_of(Eigen::Index resultant, const Point<d>& x) {
+  if (resultant < d) return Point<d>::Unit(resultant);
+  if constexpr (d == 2)
+    return {-x[1], x[0]};
+  else
+    return Point<3>::Unit(resultant - 3).cross(x);
+}
+
 }  // namespace
+
+template <int d>
+void BalanceEvaluator<d>::take_shares(const RigidMotions& rigid) {
+  shares_.setOnes();
+  if (!rigid.apart()) return;
+  const VecHandle motion = layout_.vector(d);
+  for (Eigen::Index resultant = 0; resultant < shares_.size(); ++resultant) {
+    {
+      Values values(motion);
+      for (PetscInt i = 0; i < layout_.owned(); ++i)
+        (*values).template segment<d>(i * d) = motion_of<d>(
+            resultant,
+            layout_.mesh().nodes.row(layout_.mesh_nodes()[static_cast<std::size_t>(i)]).transpose() - centroid_);
+    }
+    if (rigid.contains(motion)) shares_[resultant] = rigid.share();
+  }
+}
 
 // The equation of motion at every free node, force and moment: the supports' reactions are the residuals of the fixed
 // rows.
@@ -79,13 +107,13 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
         const Point<d> reaction = *held * left;
         const double missed = size(*held * (way - at(*supported)));  // what supports prescribe
         if (missed > 0) raise(backward, missed / w_both);
-        force.add(position, external + springy - reaction, magnitude);
+        force.add(position, external + springy - reaction, magnitude, 0, shares_);
         l.support_work += in.k * reaction.dot(way);
         (*reactions).template segment<d>(i * d) = reaction;
       } else {
         // inner forces cancel in the sum over a body; those of springs along a normal are sums of larger terms
         const double sprung = springs_ || dashpots_ ? u * row(spring_rows_) + w * row(dashpot_rows_) : 0;
-        force.add(position, external + springy, moved + given + sprung + rigid_share_ * (magnitude - moved - given));
+        force.add(position, external + springy, moved + given + sprung, magnitude - moved - given, shares_);
       }
       if (!fixed) {
         const Point<d> over = held ? Point<d>(left - *held * left) : left;

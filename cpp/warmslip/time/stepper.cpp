@@ -76,7 +76,7 @@ void Stepper<d>::set_step(double k) {
     cache_->keep(systems_);
     cost_.factorizations += systems_->factorizations();
   }
-  if (!systems_->rigid.empty()) evaluator_.rigid_share(systems_->rigid.apart() ? systems_->rigid.share() : 1);
+  evaluator_.take_shares(systems_->rigid);
   if (!systems_->constants.empty() && !heat_external_) heat_external_ = layout_.vector(1);
   cost_.factor_bytes = cache_->bytes();
 }
