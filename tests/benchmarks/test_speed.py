@@ -164,3 +164,26 @@ def test_choices(benchmark: Benchmark, say: Callable[..., None], base: dict[str,
     assert (near != 1).any()
     first, second = (statistics.median(times) for times in seconds)
     say(milliseconds_a_step=1e3 * first, milliseconds_a_step_of_the_other=1e3 * second, ratio=second / first)
+
+
+def test_sweep(benchmark: Benchmark, say: Callable[..., None]) -> None:
+    """A sweep of fifty foundation temperatures at h = k = 1/64, everything included, against the steps of such runs alone."""
+    temperatures = [float(t) for t in np.linspace(0, 20, 50)]
+    one, key = scene(64), "contact.heat_exchange.foundation_temperature"
+    seconds: dict[str, list[float]] = {"sweep": [], "steps": []}
+
+    def alternate() -> tuple[list[dict[str, Any]], list[Simulation]]:
+        start = time.process_time()
+        rows = warmslip.sweep(one, {key: temperatures})
+        seconds["sweep"].append(time.process_time() - start)
+        simulations = [Simulation(one.override(**{key: t})) for t in temperatures]
+        for simulation in simulations:
+            step_to(simulation)
+        seconds["steps"].append(sum(simulation.stepper.cost.step_seconds for simulation in simulations))
+        return rows, simulations
+
+    rows, simulations = benchmark.pedantic(alternate, rounds=3, iterations=1)
+    for row, simulation in zip(rows, simulations, strict=True):
+        assert [row[f"norm_{name}"] for name in NORMS] == pytest.approx(list(norms(simulation).values()), rel=1e-9)
+    ratios = [a / b for a, b in zip(seconds["sweep"], seconds["steps"], strict=True)]
+    say(sweep_over_its_steps=statistics.median(ratios), target_sweep_over_its_steps=1.3)
