@@ -21,7 +21,7 @@ from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
 from warmslip.studies import ask, rates
 from warmslip.studies.companions import Companion, Distance, march
-from warmslip.studies.error_estimate import richardson
+from warmslip.studies.error_estimate import JUMPS, orders, richardson
 from warmslip.studies.pilots import MESHES, STEPS, Pilots, Setting
 from warmslip.studies.recording import Recording, seconds
 from warmslip.studies.refinement_study import stamp
@@ -124,7 +124,8 @@ def _relative(found: Distance, reference: Recording, own: dict[str, float]) -> f
 def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, Any]:
     """The cheapest setting of a grid that meets the target, the smallest error there is, and that of the reference.
 
-    The error of the reference is its distance to half of it, as of order one, and a part of every error.
+    The error of the reference follows from its distance to half of it, as of order one, or of that in time of waves that jump. It
+    is a part of every error.
     Settings are run from small to large, each until its error is far from the target, or it has taken much longer than the
     cheapest that met it. Those that would for sure are left out: a run of their kind with no more cells and steps did. Those that
     met the target in about the least time are run again, alone. `least_error` is infinite where all errors are far.
@@ -134,8 +135,10 @@ def best_of_grid(one: Scene, quantities: list[str], target: float) -> dict[str, 
     many = SHORTER[one.mesh.dim] * max(counts)
     reference = Recording(pilots.companion(Setting("graded", "graded", finest, many)))
     half = reference.distance(pilots.companion(Setting("graded", "graded", finest // 2, many // 2)))
+    order_in_time, _ = orders(one, "time")
+    part, order = ("time", JUMPS) if order_in_time == JUMPS else ("space", 1.0)
     own = {
-        name: richardson(name, "space", half.values[name], 1.0) / (reference.size[name] or 1.0) for name in quantities
+        name: richardson(name, part, half.values[name], order) / (reference.size[name] or 1.0) for name in quantities
     }
     todo = [Setting(*kind) for kind in itertools.product(MESHES, STEPS, cells, counts)]
     known: list[tuple[float, Setting]] = []
