@@ -309,6 +309,33 @@ def weak_and_stiff_springs(d: int) -> None:
 
 
 @check
+def a_body_one_cell_thick_falls_between_guides(d: int) -> None:
+    """Every node is held across the fall, in steps far longer than waves need: backward Euler's fall, without a strain."""
+    turn = np.linalg.qr(np.array([[0.8, -0.6, 0.1], [0.5, 0.7, -0.3], [0.2, 0.4, 0.9]])[:d, :d])[0]
+    turn *= np.linalg.det(turn) if d == 3 else [np.linalg.det(turn), 1.0]
+    sides = ("left", "right")
+    for supports, axes in (
+        ({"displacement": {side: [0.0, *["free"] * (d - 1)] for side in sides}}, np.eye(d)),
+        ({"displacement": {side: {"normal": 0.0} for side in sides}}, turn),
+        ({"springs": {side: {"normal_stiffness": 1e3} for side in sides}}, turn),
+    ):
+        one = pressed(
+            d,
+            {},
+            mesh=body(d, [1, *[3] * (d - 1)]) | {"lengths": [0.2, *[1.0] * (d - 1)]},
+            elasticity=elasticity(d, 1e6, 0.3),
+            inertia={"density": 1e-3},
+            supports=supports,
+            loads={"body": along(d, -1e-3)},
+        )
+        there, mesh = turned(one, axes)
+        simulation = completed(there, mesh=mesh)
+        k, n = 0.25, 4
+        fall = np.asarray(along(d, -k * k * n * (n + 1) / 2))
+        assert np.abs(field(simulation, "u") @ axes - fall).max() <= 1e-12
+
+
+@check
 def a_hard_inset_of_a_body_on_rollers(d: int) -> None:
     """A contact bears a body that rollers guide, whatever the stiffness of a part of it: it ends as that of a rigid one."""
     ends = []

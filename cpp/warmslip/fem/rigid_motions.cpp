@@ -98,17 +98,15 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const 
     : right_(layout.vector(width)) {
   const Mesh<d>& mesh = layout.mesh();
   const std::vector<Index> root = connected(mesh);
-  std::vector<bool> avoided(root.size(), false), held(root.size(), false);
+  std::vector<bool> avoided(root.size(), false);
   for (const auto& name : avoid)
     for (const Index node : mesh.part(name).nodes.reshaped()) avoided[static_cast<std::size_t>(node)] = true;
   std::vector<std::vector<Index>> parts(root.size());
   for (std::size_t i = 0; i < root.size(); ++i)
     parts[static_cast<std::size_t>(root[i])].push_back(static_cast<Index>(i));
   std::vector<std::vector<std::size_t>> forms(root.size());
-  for (std::size_t i = 0; i < resisted.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < resisted.nodes.size(); ++i)
     forms[static_cast<std::size_t>(root[static_cast<std::size_t>(resisted.nodes[i])])].push_back(i);
-    held[static_cast<std::size_t>(resisted.nodes[i])] = true;
-  }
   std::vector<Eigen::VectorXd> rows;  // Z at the springs
   for (const auto& nodes : parts) {
     if (nodes.size() < 2) continue;  // a node of no cell
@@ -124,18 +122,14 @@ RigidMotions::RigidMotions(const Layout<d>& layout, int block, int width, const 
       motions_.push_back(layout.vector(block));
       layout.distribute(values, motions_.back());
     }
-    // springs where they hold the motions best, which in soft nodes they do not: rows of Z by pivoting, on the nodes
-    // that are not avoided if they suffice
+    // springs where they hold the motions best, which in soft nodes they do not, and along what supports hold not at
+    // all: rows of Z by pivoting, on the nodes that are not avoided if they suffice
     Eigen::MatrixXd weighted = z;
     double firmest = 0;
     for (const Index node : nodes) firmest = std::max(firmest, firmness[node]);
     for (std::size_t i = 0; firmest > 0 && i < nodes.size(); ++i)
       weighted.middleRows(static_cast<Eigen::Index>(i) * block, block) *= std::sqrt(firmness[nodes[i]] / firmest);
-    Eigen::MatrixXd candidates;
-    for (std::size_t i = 0; i < nodes.size(); ++i)  // a spring at a held node would act on what is held
-      if (held[static_cast<std::size_t>(nodes[i])])
-        weighted.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();
-    candidates = weighted;
+    Eigen::MatrixXd candidates = weighted;
     for (std::size_t i = 0; i < nodes.size(); ++i)
       if (avoided[static_cast<std::size_t>(nodes[i])])
         candidates.middleRows(static_cast<Eigen::Index>(i) * block, block).setZero();

@@ -36,9 +36,15 @@ void BalanceEvaluator<d>::find_shape_functions() {
       if (b.minCoeff() < -1e-9 || b.sum() > 1 + 1e-9 || (sides * b - (x - corners.col(0))).norm() > 1e-9 * sides.norm())
         continue;
       found = true;
-      entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, 0)), 1 - b.sum());
-      for (int i = 1; i < d; ++i)
-        entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, i)), b[i - 1]);
+      Point<d> weights(Point<d>::Constant(1 - b.sum()));
+      weights.template tail<d - 1>() = b;
+      if (weights.maxCoeff() > 1 - 1e-9) {  // at a corner: rounding of the others would carry large forces to them
+        Eigen::Index corner;
+        weights.maxCoeff(&corner);
+        weights = Point<d>::Unit(corner);
+      }
+      for (int i = 0; i < d; ++i)
+        if (weights[i] != 0) entries.emplace_back(static_cast<int>(q), column.at(facets.nodes(facet, i)), weights[i]);
       --facet;
     }
     if (!found) throw std::logic_error("a contact point lies on no facet of its part");

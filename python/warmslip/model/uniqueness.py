@@ -232,13 +232,16 @@ class _Form:
     """The two sides of (2) for all weights."""
 
     def __init__(self, points: ContactPoints) -> None:
-        a, n, mu, balanced = points.operator, len(points.weights), points.friction, points.balanced
+        a, n, balanced = points.operator, len(points.weights), points.balanced
+        own = np.diag(a)[n:].reshape(n, -1).sum(axis=1)
+        slips = own > 0  # a point that supports hold does not, and has no friction to count
+        mu = np.where(slips, points.friction, 0.0)
         self._n, self._across = n, points.normals.shape[1] - 1
         # both sides of (2) vanish on forces that move nothing, where all weights of these are the same
         self._free, self._apart = balanced.shares.shape[1] == 0, ~balanced.shared(n)
         base = np.zeros((len(a), balanced.moved.shape[1]))
         base[balanced.there] = np.diag(balanced.scale) if self._free else balanced.scale[:, None] * balanced.moved
-        self._mu, self._own = mu, np.diag(a)[n:].reshape(n, -1).sum(axis=1)
+        self._mu, self._own = mu, np.where(slips, own, 1.0)
         self._a, self._base, self._moved = a @ base, base, a[n:] @ base
         self.size = base.shape[1]
 
@@ -277,6 +280,8 @@ class _Form:
         """The bound alone."""
         left, right = self._sides(p, q, t)
         try:
+            if not right.any():  # nothing slips with friction
+                return np.inf
             if self.size <= SMALL:
                 return float(1 / eigh(right, left, eigvals_only=True)[-1])
             return 1 / _largest(right, cholesky(left, lower=True))

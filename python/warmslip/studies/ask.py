@@ -18,7 +18,7 @@ from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import QUANTITIES, Distance, march
 from warmslip.studies.error_estimate import orders, richardson
 from warmslip.studies.error_norms import TERMS
-from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, Setting, describe, together
+from warmslip.studies.pilots import MESHES, STEPS, Choice, Pilots, Say, Setting, describe
 
 SAFETY = 1.15  # what is aimed at lies so far below what is asked for
 ROUND_OFF = 1e-10  # relative errors below it are not promised
@@ -214,7 +214,7 @@ def solve(
         parts = {name: _parts(pilots, setting, name, [*space[:1], time], size[name]) for name in found.quantities}
         for name in found.quantities if halved else []:
             pilots.learn_power(name, *(one.values[name] for one in (space[0], time, space[1])))
-        errors = {name: together(one["space"], one["time"], pilots.power[name]) for name, one in parts.items()}
+        errors = {name: pilots.total(name, one["space"], one["time"]) for name, one in parts.items()}
         estimated = max(errors.values())
         if estimated <= error or len(tries) == TRIES:
             break

@@ -27,6 +27,7 @@ from warmslip.report import cost
 from warmslip.scene import plausibility
 from warmslip.scene.reader import build, load
 from warmslip.simulation.simulation import Simulation
+from warmslip.simulation.summary import summary
 
 Array = Any
 MOST = 8  # points whose statuses are all looked at
@@ -171,6 +172,49 @@ def test_below_it_every_load_has_one_solution() -> None:
                 found = solutions(rough, free, penetration)
                 assert len(found) == 1
                 assert law_defect(rough, found[0], free, penetration) < 1e-11
+
+
+@pytest.mark.parametrize("axes", [(0, 1), (1, 0)])
+def test_a_point_that_cannot_slip_takes_no_part(axes: tuple[int, int]) -> None:
+    """A point whose tangential motion supports hold leaves the bound of the others; alone it leaves every coefficient."""
+    random = np.random.default_rng(3)
+    root = random.normal(size=(4, 4))
+    c = root @ root.T
+
+    def points(compliance: Any) -> ContactPoints:
+        n = len(compliance) // 2
+        ones = np.ones(n)
+        return ContactPoints(
+            compliance=compliance,
+            normals=np.eye(2)[[axes[0]] * n],
+            weights=ones,
+            step=0.5,
+            stiffness=5 * ones,
+            friction=ones,
+        )
+
+    one = points(c[:2, :2])
+    there = np.zeros((4, 4))
+    there[:2, :2], there[2 + axes[0], 2 + axes[0]] = c[:2, :2], 2.0
+    assert bound(points(there)) == pytest.approx(bound(one), rel=1e-6)
+    assert bound(points(there[2:, 2:])) == np.inf
+
+
+def test_a_run_ends_where_parts_meet_at_a_held_corner() -> None:
+    contact = [{"part": "bottom", "stiffness": 1.0}, {"part": "left", "stiffness": 1.0, "quadrature": "gauss-2"}]
+    contact[1]["friction"] = {"coefficient": 1.0}
+    scene = build(
+        {
+            "mesh": {"n": [3, 1]},
+            "time": {},
+            "elasticity": {"lame": [1.0, 1.0]},
+            "supports": {"points": [{"at": [0.0, 0.0]}], "displacement": {"top": ["free", 0.0]}},
+            "contact": contact,
+        }
+    )
+    simulation = Simulation(scene)
+    assert list(simulation.steps()) and all(np.isfinite(one) for one in simulation.statistics.residuals.values())
+    assert not [one for one in summary(simulation)["warnings"] if "nan" in one]
 
 
 def test_beyond_it_a_load_has_several_that_satisfy_the_law() -> None:
