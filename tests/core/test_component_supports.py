@@ -336,6 +336,58 @@ def a_body_one_cell_thick_falls_between_guides(d: int) -> None:
 
 
 @check
+def a_strip_pinched_between_two_foundations(d: int) -> None:
+    """Forces from both sides each move a strip far that a weak spring holds, and together press it evenly."""
+    sides = [[4.0, 0.1], [4.0, 1.0, 0.1]][d - 2]
+    modulus = 1 / (1 - 0.3**2) if d == 2 else 1.0  # across the strip, which is free to widen
+    for stiffness in (1e2, 1e4, 1e7):
+        for spring in (1e-3, 1.0):
+            one = pressed(
+                d,
+                {},
+                mesh=body(d, 2) | {"lengths": sides},
+                time={"steps": 1},
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"springs": {"left": {"stiffness": spring}}},
+                contact=[
+                    {"part": "top", "stiffness": "rigid"},
+                    {"part": "bottom", "stiffness": stiffness, "gap": -2.8e-7},
+                ],
+            )
+            simulation = completed(one, digits=6.0)
+            force = np.asarray(simulation.stepper.contact_force).reshape(-1, d)[:, d - 1]
+            area = np.prod(sides[:-1])
+            even = 2.8e-7 * area / (0.1 / modulus + 1 / stiffness)
+            assert [-force[force < 0].sum(), force[force > 0].sum()] == pytest.approx([even] * 2, rel=0.02)
+
+
+@check
+def points_whose_nodes_are_held_in_different_ways(d: int) -> None:
+    """A direction in which a roller holds one node and a clamp the other is held at the points between, whatever the law."""
+    held: dict[str, Any] = {"left": [0.0, *["free"] * (d - 1)]}
+    if d == 3:
+        held |= {"front": ["free", 0.0, "free"], "back": ["free", 0.0, "free"]}
+    smooth = {"coefficient": 0.0}
+    for quadrature in ("gauss-1", "gauss-2"):
+        ends = []
+        rough = [{"coefficient": 0.3, "regularisation": 1e-3}] if d == 2 else []  # in space some points slip
+        for friction in (smooth, smooth | {"regularisation": 1e-3}, *rough):
+            one = pressed(
+                d,
+                {},
+                n=1,
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"displacement": held, "points": [{"at": [1.0] * d}]},
+                loads={"body": along(d, 0.002)},
+                contact={"part": "top", "stiffness": "rigid", "quadrature": quadrature, "friction": friction},
+            )
+            ends.append(field(completed(one), "u"))
+        assert ends[0].any()
+        for u in ends[1:]:
+            assert np.abs(u - ends[0]).max() <= 1e-9 * np.abs(ends[0]).max()
+
+
+@check
 def a_hard_inset_of_a_body_on_rollers(d: int) -> None:
     """A contact bears a body that rollers guide, whatever the stiffness of a part of it: it ends as that of a rigid one."""
     ends = []

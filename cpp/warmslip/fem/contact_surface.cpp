@@ -133,16 +133,16 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   moving_shape_ = (shape_ * free_).pruned();
   held_ = Eigen::MatrixXd::Zero(count * d, d);
   for (Eigen::Index q = 0; q < count; ++q) {
-    Tensor2<d> held = Tensor2<d>::Zero();
-    bool first = true;  // a direction is held where all nodes about the point hold it
+    Tensor2<d> left = Tensor2<d>::Zero();  // a direction is held where all nodes about the point hold it
     prescribed_.push_back(true);
     for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(scalar_shape_, q); entry; ++entry) {
       if (!fixed[static_cast<std::size_t>(entry.col())]) prescribed_.back() = false;
-      const Tensor2<d> here = held_at(nodes_[static_cast<std::size_t>(entry.col())]);
-      if (!first && !here.isApprox(held)) held.setZero();
-      if (first) held = here;
-      first = false;
+      left += Tensor2<d>::Identity() - held_at(nodes_[static_cast<std::size_t>(entry.col())]);
     }
+    Tensor2<d> held = Tensor2<d>::Zero();
+    const Eigen::SelfAdjointEigenSolver<Tensor2<d>> frame(left);
+    for (int a = 0; a < d; ++a)
+      if (frame.eigenvalues()[a] < 1e-12) held += frame.eigenvectors().col(a) * frame.eigenvectors().col(a).transpose();
     if (!prescribed_.back()) held_.template middleRows<d>(q * d) = held;
   }
 
