@@ -56,7 +56,7 @@ void bind(py::module_& m) {
           "Sets the state; None for a field the problem does not have.")
       .def(
           "resume",
-          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 17>& given,
+          [](S& s, const Eigen::VectorXd& force, const std::vector<int>& status, const std::array<double, 18>& given,
              int taken) {
             std::vector<Status> statuses;
             for (const int one : status) statuses.push_back(static_cast<Status>(one));
@@ -66,6 +66,7 @@ void bind(py::module_& m) {
               for (double Extent::*part : extent_parts) field->*part = *value++;
             extents.force = *value++;
             extents.looked = *value++;
+            extents.speed = *value++;
             for (double& along : extents.motion) along = *value++;
             s.resume(force, statuses, extents, taken);
           },
@@ -77,18 +78,19 @@ void bind(py::module_& m) {
           "extents",
           [](const S& s) {
             FieldExtents extents = s.extents();
-            std::array<double, 17> out{};
+            std::array<double, 18> out{};
             auto value = out.begin();
             for (const Extent* field : extents.all())
               for (double Extent::*part : extent_parts) *value++ = field->*part;
             *value++ = extents.force;
             *value++ = extents.looked;
+            *value++ = extents.speed;
             for (const double along : extents.motion) *value++ = along;
             return out;
           },
           "Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may "
           "make of it, and the largest estimated change; then the largest nodal force, the displacement at the last "
-          "look at the stress, and the largest displacements of contact points, by axis.")
+          "look at the stress, the largest velocity, and the largest displacements of contact points, by axis.")
       .def("part", &S::part, py::arg("strained"), py::arg("strained_w"), py::arg("rigid"),
            "After `start`: displacement and velocity of a body without supports but for rigid motions, and the "
            "velocities of those.")

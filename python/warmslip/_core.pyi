@@ -1256,7 +1256,7 @@ class Stepper2:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(17)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(18)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
@@ -1265,9 +1265,9 @@ class Stepper2:
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def extents(self) -> typing.Annotated[list[float], "FixedSize(17)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(18)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, and the largest displacements of contact points, by axis.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements of contact points, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1482,7 +1482,7 @@ class Stepper3:
         """
         Drops what is remembered of earlier steps beside the state.
         """
-    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(17)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def resume(self, contact_force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], status: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], extents: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(18)"], taken: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         After `start`: the contact points of the step before, the extents so far and the number of steps, for the same next step to the last bit.
         """
@@ -1491,9 +1491,9 @@ class Stepper3:
         Sets the state; None for a field the problem does not have.
         """
     @property
-    def extents(self) -> typing.Annotated[list[float], "FixedSize(17)"]:
+    def extents(self) -> typing.Annotated[list[float], "FixedSize(18)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, and the largest displacements of contact points, by axis.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements of contact points, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

@@ -2,7 +2,7 @@
 
 Each scene is solved for a target. The true error of the answer is its distance to a finer run, and what that run errs itself. A
 grid of settings of every kind is run against one reference; the cheapest of those that meet the target is what the choice is
-compared with. The 26 scenes in the plane (`--dim 2`) take a quarter of an hour, those in space longer, and several gigabytes.
+compared with. The 26 scenes in the plane (`--dim 2`) take a quarter of an hour, those in space half an hour and three gigabytes.
 """
 
 from __future__ import annotations

@@ -288,6 +288,36 @@ def hats(simulation: Simulation) -> Any:
 
 
 @check
+def what_a_jump_in_a_short_step_leaves(d: int) -> None:
+    """Rounding of the velocity of a support that jumps stays in the body; digits know, whatever the unit of length."""
+    errors, known = [], []
+    for halvings in (2, 20, 40):
+        ends = []
+        for unit in (1.0, 0.3):
+            jump = along(d, f"where(t > 0, {0.01 * unit}, 0)")
+            simulation = Simulation(
+                scene(
+                    d,
+                    2,
+                    length=unit,
+                    time={"end": 1.0, "steps": 4, "graded_to": [0.0], "halvings": halvings},
+                    elasticity=elasticity(d, 1.0, 0.3),
+                    inertia={"density": unit**-2},
+                    supports={"displacement": {"bottom": jump}},
+                )
+            )
+            assert len(list(simulation.steps())) == simulation.scene.clock.steps, simulation.failure
+            ends.append(field(simulation, "u") / unit)
+        errors.append(np.abs(ends[1] - ends[0]).max() / np.abs(ends[0]).max())
+        known.append(summary(simulation)["digits"])
+        assert errors[-1] <= 2 * 10 ** -known[-1]["u"]
+    assert known[0]["u"] > 13 and known[0]["stress"] > 11
+    assert 8 < known[1]["u"] < 11
+    assert known[2]["u"] < 5 and known[2]["stress"] < 5
+    assert errors[2] > 1e-7
+
+
+@check
 def pressures_of_gauss_points_on_a_stiff_foundation(d: int) -> None:
     """Nothing rubs and all is pressed: pressures are stiffness times depth, so that they are linear along every facet.
 

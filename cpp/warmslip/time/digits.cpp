@@ -194,6 +194,17 @@ void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, Cont
   }
   errors_ = likely;
   for (std::size_t i = 0; i < fields.size(); ++i) fields[i]->tried = worst[i];
+  if (moved && operators_.inertia) add_coasting();
+}
+
+// Adds where the body has gone by the rounding of its largest velocity so far, which inertia keeps: that of a support
+// that jumped in a short step, say.
+template <int d>
+void Stepper<d>::add_coasting() {
+  const double way = std::numeric_limits<double>::epsilon() * std::max(extents_.speed, next_.sizes.straining) * time_,
+               size = std::max(extents_.u.size, next_.sizes.u);
+  extents_.u.tried += way;
+  if (size > 0) extents_.stress.tried += extents_.stress.size * way / size;
 }
 
 // Whether the step that is being taken is one whose digits are measured anyway; counted from time zero, so that a run
@@ -216,6 +227,7 @@ void Stepper<d>::note_sizes(const ContactSolution<d>& contact) {
   };
   grow(extents_.u, next_.sizes.u);
   grow(extents_.theta, next_.sizes.theta);
+  extents_.speed = std::max(extents_.speed, next_.sizes.straining);
   if (next_.elastic_u && next_.sizes.u > 2 * extents_.looked) {
     extents_.looked = next_.sizes.u;
     grow(extents_.stress, stress_size(layout_, problem_, next_.shape(), next_.straining()).largest);

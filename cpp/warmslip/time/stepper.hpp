@@ -63,6 +63,7 @@ struct Extent {
 struct FieldExtents {
   Extent u, theta, stress, contact_force;
   double force = 0;                                  ///< the largest nodal force so far
+  double speed = 0;                                  ///< the largest velocity so far
   double looked = 0;                                 ///< the size of u when the stress was looked at last
   Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< the largest displacement of a contact point so far, by axis
 
@@ -233,6 +234,7 @@ class Stepper {
   static void fix(Vec v, const std::vector<PetscInt>& indices, Vec given, double scale = 1);
   bool monolithic() const { return options_.coupling == Coupling::monolithic && systems_->momentum && now_.theta; }
   bool reactive() const { return systems_->heat && surface_.points() > 0 && problem_.contact_heats(); }
+  void add_coasting();
   bool measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const;
   bool iterative() const;
   bool in_range(const Eigen::VectorXd& values) const;

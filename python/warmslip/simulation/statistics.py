@@ -72,7 +72,7 @@ class Statistics:
         `extents` are those of the stepper.
         """
         found = dict(self.errors)
-        for name, (size, _, change) in zip(FIELDS, np.reshape(extents[:-5], (-1, 3)), strict=True):
+        for name, (size, _, change) in zip(FIELDS, np.reshape(extents[:-6], (-1, 3)), strict=True):
             if name in found and size > 0:
                 found[name] = max(found[name], float(change / size))
         return found
