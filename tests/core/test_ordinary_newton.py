@@ -1,4 +1,4 @@
-"""The curve of an ordinary Newton: it has the discrete solution of the core, or there is no point."""
+"""The curves of other codes: they have the discrete solution of the core, or there is no point."""
 
 from __future__ import annotations
 
@@ -22,6 +22,12 @@ def test_its_answer_is_ours(contest: str) -> None:
     assert point["e_sum"] == 0.25 and point["cpu_seconds"] != 0.1
     steps = CONTESTS[contest].at("equal steps", 8).time.steps
     assert point["factorizations"] > steps  # one an iteration, and that of the heat
+
+
+def test_scipy_has_the_same_answer_with_two_factors() -> None:
+    point = ordinary_newton.point("paper_hot", like(8), ordinary_newton.FACTORED)
+    assert point["from_ours"] < ordinary_newton.SAME and point["factorizations"] == 2
+    assert point["e_sum"] == 0.25 and point["cpu_seconds"] != 0.1
 
 
 def test_another_answer_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

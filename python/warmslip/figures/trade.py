@@ -13,12 +13,15 @@ from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, 
 from warmslip.records import tables
 
 EQUAL = 1.1  # ratio up to which two CPU times are one
-ORDINARY = "ordinary Newton"  # equal steps by another code
+ORDINARY, FACTORED = "ordinary Newton", "SciPy, factored once"  # equal steps by other codes
 LOOKS = {  # name, the keys that make it, colour and marker
     "equal steps": ("time.steps", INK, "o"),
     "equal steps, lagged": ("time.coupling=lagged", GREY, "h"),
     "equal steps, monolithic": ("time.coupling=monolithic", PURPLE, "s"),
     "equal steps, gauss-2": ("contact.quadrature=gauss-2", SKY, "D"),
+    "equal steps, soft foundation": ("contact.stiffness=1e3", SKY, "X"),
+    "equal steps, rigid foundation": ("contact.stiffness=rigid", PURPLE, "X"),
+    "equal steps, regularised friction": ("contact.friction.regularisation=1e-2", GREY, "X"),
     "graded steps": ("time.graded_to=[0.0]", ORANGE, "^"),
     "more graded steps": ("time.graded_to, 4 x time.steps", ORANGE, "<"),
     "adaptive steps": ("time.tolerance", GREEN, "v"),
@@ -28,6 +31,7 @@ LOOKS = {  # name, the keys that make it, colour and marker
     "graded mesh, more graded steps": ("both graded_to, 4 x time.steps", VERMILLION, "<"),
     "graded mesh, adaptive steps": ("mesh.graded_to, time.tolerance", BLUE, "v"),
     ORDINARY: ("scikit-fem", INK, "P"),
+    FACTORED: ("another code", INK, "*"),
 }
 ERRORS = {
     "e_sum": "sum of the norms",
@@ -67,7 +71,7 @@ def _panel(ax: Any, rows: list[tables.Row], key: str) -> dict[str, Any]:
         own = [row for row in rows if row["method"] == method and row[key] > 0]
         if own:
             x, y = [row["cpu_seconds"] for row in own], [row[key] for row in own]
-            dashes = (0, (1, 1)) if method == ORDINARY else "-"
+            dashes = (0, (1, 1)) if method in (ORDINARY, FACTORED) else "-"
             (handles[f"{method} ({keys})"],) = ax.loglog(
                 x, y, color=colour, marker=marker, mec="white", mew=0.4, lw=1.2, ls=dashes
             )
@@ -89,7 +93,7 @@ def _best(name: str, rows: list[tables.Row]) -> str:
     """How much cheaper than the finest run with equal steps, and than an ordinary Newton, the error of that run can be had."""
     equal = [row for row in rows if row["method"] == "equal steps"]
     finest = max(equal, key=lambda row: row["n"])
-    ours = [row for row in rows if row["method"] in LOOKS and row["method"] != ORDINARY]
+    ours = [row for row in rows if row["method"] in LOOKS and row["method"] not in (ORDINARY, FACTORED)]
     best = min((row for row in ours if row["e_sum"] <= finest["e_sum"]), key=lambda row: row["cpu_seconds"])
     gain = finest["cpu_seconds"] / best["cpu_seconds"]
     text = (

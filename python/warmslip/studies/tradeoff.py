@@ -46,6 +46,9 @@ METHODS: dict[str, Callable[[int, int], Keys]] = {
     "equal steps, lagged": lambda n, m: _equal(n, m) | {"time.coupling": "lagged"},
     "equal steps, monolithic": lambda n, m: _equal(n, m) | {"time.coupling": "monolithic"},
     "equal steps, gauss-2": lambda n, m: _equal(n, m) | {"contact.quadrature": "gauss-2"},
+    "equal steps, soft foundation": lambda n, m: _equal(n, m) | {"contact.stiffness": 1e3},
+    "equal steps, rigid foundation": lambda n, m: _equal(n, m) | {"contact.stiffness": "rigid"},
+    "equal steps, regularised friction": lambda n, m: _equal(n, m) | {"contact.friction.regularisation": 1e-2},
     "graded steps": _graded_steps,
     "more graded steps": _more_graded_steps,
     "adaptive steps": _adaptive,
@@ -101,6 +104,8 @@ class Contest:
         return " ".join([f"warmslip run {self.scene}", *keys])
 
 
+# another model in the place of the scene's: what it is off stays, however fine the mesh
+KNOBS = ["equal steps, soft foundation", "equal steps, rigid foundation", "equal steps, regularised friction"]
 STEPPING = ["equal steps", "graded steps", "more graded steps", "adaptive steps", "adaptive steps, smaller tolerance"]
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 LEVELS = [8, 16, 20, 24, 32, 64, 128]  # of the paper's problem
@@ -121,7 +126,7 @@ CONTESTS = {
     "stick_slip": Contest(
         "sliding_block",
         {},
-        STEPPING,
+        [*STEPPING, *KNOBS],
         [4, 8, 16, 32],
         64,
         ratio=16,
@@ -130,7 +135,7 @@ CONTESTS = {
     "block": Contest(
         "block_3d",
         {},
-        [*STEPPING, "graded mesh", "graded mesh and steps"],
+        [*STEPPING, "graded mesh", "graded mesh and steps", *KNOBS],
         [4, 8, 12],
         20,
         ratio=2,
