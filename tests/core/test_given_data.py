@@ -91,7 +91,7 @@ def test_a_stepper_refuses_what_does_not_fit(dim: int) -> None:
         (lambda: stepper.start(None, u, theta, gap, 0.0), "u is missing"),
         (lambda: stepper.start(u, u, None, gap, 0.0), "theta is missing"),
         (lambda: stepper.start(u, u, theta, gap[1:], 0.0), "one value a contact point"),
-        (lambda: stepper.resume(np.zeros(1), [0], [0.0] * 17, 0), "one entry a contact point"),
+        (lambda: stepper.resume(np.zeros(1), [0], [0.0] * 18, 0), "one entry a contact point"),
         (lambda: stepper.advance(None, data.heat, gap), "a load vector is missing"),
         (lambda: stepper.advance(data.force, None, gap), "a load vector is missing"),
         (lambda: stepper.advance(data.force, data.heat, gap[1:]), "one value a contact point"),

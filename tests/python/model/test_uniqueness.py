@@ -303,7 +303,7 @@ def step_from(scene: Scene, starts: list[Array], force: Array | None, penetratio
     out = []
     for start in starts:
         stepper = d.stepper()
-        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 17, 0)
+        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 18, 0)
         loads = list(d.load_vectors.at(scene.step, scene.step))
         if force is not None:
             vector = d.layout.vector(d.dim)
