@@ -41,7 +41,7 @@ template <int d>
 struct ContactSolver<d>::Trial {
   explicit Trial(ContactSolver& owner) : solver(owner), options(owner.options_) { solver.clear_cache(); }
   ~Trial() {
-    solver.carries_ = false;
+    solver.carries_ = solver.terms_cancel_ = false;
     solver.tangential_scale_ = 1;
     solver.stiff_proximal_ = 0;
     solver.spring_ = 0;

@@ -108,6 +108,12 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
     return false;
   });
   attempt(Stage::enumeration, [&] { return enumerate(problem, solution); });
+  attempt(Stage::restart, [&] {
+    const Trial trial(*this);
+    terms_cancel_ = true;
+    move();
+    return newton(problem, true, solution);
+  });
   if (massive && !lent_ && rigid_unit_ * rigid_.inertia.norm() < 1e-12 &&
       (!solution.converged || slips_alone(problem, solution)))
     stick_at_one_point(problem, solution);

@@ -73,6 +73,7 @@ class ContactSolver {
   double lent_mass_ = 0;             // > 0: an inertia that draws the rigid motions to where they were, dimensionless
   bool lent_ = false;                // whether its mass is lent by the solver of a body without mass
   bool carries_ = false;             // whether a point's own compliance includes the rigid motions
+  bool terms_cancel_ = false;        // whether rounding of terms that cancel is no residual, see accept
   double rigid_unit_ = 1;            // velocity per force, the unit of the rigid motions
   double compliance_norm_ = 0;       // largest row sum of |compliance|, a bound on its eigenvalues
   std::vector<int> tangent_status_;  // statuses the tangent below belongs to
