@@ -24,11 +24,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # tests, for the independent code
 
 import warmslip
+from warmslip.figures.trade import ORDINARY, OTHERS
 from warmslip.records import tables
 from warmslip.scene.scene import Scene
 from warmslip.studies.tradeoff import CONTESTS
 
-METHOD, FACTORED = "ordinary Newton", "SciPy, factored once"
 LEVELS = (8, 16, 32, 64, 128)
 SAME = 1e-8  # relative difference up to which two codes have one discrete solution
 SYMMETRIC: dict[str, Any] = {  # the fastest of SuperLU's orderings here
@@ -107,13 +107,13 @@ def from_ours(scene: Scene, found: dict[str, float]) -> float:
     return max(abs(found[name] - known[name]) / scale[name] for name in known if name in found)
 
 
-def point(contest: str, like: dict[str, Any], method: str = METHOD) -> dict[str, Any]:
+def point(contest: str, like: dict[str, Any], method: str = ORDINARY) -> dict[str, Any]:
     """The row of a mesh, from that of equal steps. Raises RuntimeError where the two codes differ."""
     n = like["n"]
     scene = CONTESTS[contest].at("equal steps", n)
     exchange = scene.contacts[0].heat_exchange
     assert exchange is not None
-    found = (simulate if method == METHOD else factored_once)(
+    found = (simulate if method == ORDINARY else factored_once)(
         float(exchange.foundation_temperature), n, scene.time.steps
     )
     gap = from_ours(scene, found)
@@ -138,14 +138,12 @@ def main() -> None:
     try:
         import skfem
     except ImportError:
-        print(f"no curve of {METHOD}: scikit-fem is not installed (pip install scikit-fem)", file=sys.stderr)
+        print(f"no curve of {ORDINARY}: scikit-fem is not installed (pip install scikit-fem)", file=sys.stderr)
         return
-    rows = [row for row in tables.read(given.table) if row["method"] not in (METHOD, FACTORED)]
+    rows = [row for row in tables.read(given.table) if row["method"] not in OTHERS]
     equal = {row["n"]: row for row in rows if row["method"] == "equal steps"}
     stamp = json.loads(given.table.with_suffix(".json").read_text())
-    rows += [
-        point(given.contest, equal[n], method) for method in (METHOD, FACTORED) for n in given.levels if n in equal
-    ]
+    rows += [point(given.contest, equal[n], method) for method in OTHERS for n in given.levels if n in equal]
     tables.write(given.table, rows, stamp | {"ordinary_newton": f"scikit-fem {skfem.__version__}"})
 
 

@@ -53,8 +53,8 @@ class ContactSurface {
   /// Forces at the points as nodal forces, without those that a support takes, (d nodes).
   Eigen::VectorXd to_nodes(const Eigen::VectorXd& forces) const;
   /// Compliance of the points from that of the nodes; a node whose displacement is prescribed has none. In directions
-  /// in which supports hold a point and leave others free, it gets a thousandth of the compliance that it has in the
-  /// latter, so that the law has one answer there: without a motion, no force along them.
+  /// in which supports hold a point and leave others free, it gets 1e-11 of the compliance that it has in the latter,
+  /// so that the law has one answer there: without a motion, no force along them.
   Eigen::MatrixXd at_points(const Eigen::MatrixXd& compliance) const;
   /// The same for scalars, one value a node and a point: (points, nodes).
   const Eigen::SparseMatrix<double, Eigen::RowMajor>& scalar_shape() const { return scalar_shape_; }

@@ -31,9 +31,7 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   if (like) {
     inertia_rows_ = like->inertia_rows_;
   } else if (operators.inertia) {  // its entries are positive
-    const VecHandle ones = layout.vector(d), sums = layout.vector(d);
-    WARMSLIP_PETSC(VecSet(ones, 1));
-    multiply(operators.inertia, ones, sums);
+    const VecHandle sums = row_sums(operators.inertia);
     inertia_rows_ = (*Values(sums)).reshaped(d, layout.owned()).colwise().maxCoeff().transpose();
   }
   if (operators.viscosity) viscous_w_ = layout.vector(d);

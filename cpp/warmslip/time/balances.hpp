@@ -84,7 +84,8 @@ class BalanceEvaluator {
   std::vector<bool> temperature_prescribed_;  // a node
   std::vector<int> support_;                  // of a node in held_, -1 where it is free
   std::vector<Tensor2<d>> held_;              // projectors onto the directions in which the displacement is given
-  Eigen::VectorXd shares_ = Eigen::VectorXd::Ones(d * (d + 1) / 2);  // of forces and moments, see take_shares
+  using Resultants = Eigen::Vector<double, d*(d + 1) / 2>;  // along the axes, then about them
+  Resultants shares_ = Resultants::Ones();                  // of the inner forces' rounding, see take_shares
   bool stores_magnitudes_ = false;             // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity
   double free_expansion_ = 0, reference_ = 0;  // displacement of the free body per temperature; reference temperature

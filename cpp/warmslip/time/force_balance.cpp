@@ -15,13 +15,14 @@ struct Resultant {
   static constexpr int moments = d == 2 ? 1 : 3, many = d + moments;
   Eigen::Vector<double, many> sum = Eigen::Vector<double, many>::Zero(), size = sum;
   // a force at a place, and the magnitudes of its own terms: outer ones, and inner ones that count in part
-  void add(const Point<d>& x, const Point<d>& f, double outer, double inner, const Eigen::VectorXd& shares) {
+  void add(const Point<d>& x, const Point<d>& f, double outer, double inner,
+           const Eigen::Vector<double, many>& shares) {
     sum.template head<d>() += f;
     if constexpr (d == 2)
       sum[2] += x[0] * f[1] - x[1] * f[0];
     else
       sum.template tail<3>() += x.cross(f);
-    const Eigen::Vector<double, many> magnitude = outer + inner * shares.array();
+    const Eigen::Vector<double, many> magnitude = (outer + inner * shares.array()).matrix();
     size.template head<d>() += magnitude.template head<d>();
     size.template tail<moments>() += x.norm() * magnitude.template tail<moments>();
   }

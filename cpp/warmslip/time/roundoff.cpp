@@ -40,6 +40,14 @@ Eigen::VectorXd row_sizes(Mat a) {
   return sizes.reshaped(block, sizes.size() / block).colwise().maxCoeff().transpose();
 }
 
+VecHandle row_sums(Mat a) {
+  VecHandle ones, sums;
+  WARMSLIP_PETSC(MatCreateVecs(a, ones.out(), sums.out()));
+  WARMSLIP_PETSC(VecSet(ones, 1));
+  WARMSLIP_PETSC(MatMult(a, ones, sums));
+  return sums;
+}
+
 double largest_entry(Vec v) {
   PetscReal value = 0;
   if (v) WARMSLIP_PETSC(VecNorm(v, NORM_INFINITY, &value));

@@ -26,6 +26,9 @@ double largest_of(std::initializer_list<double> terms);
 /// Sum of |entries| of every row that this rank owns; the largest of the rows of a node. Empty for no matrix.
 Eigen::VectorXd row_sizes(Mat a);
 
+/// Sums of the rows of a matrix that may be known by its products alone (collective).
+VecHandle row_sums(Mat a);
+
 /// Largest of some sizes over all ranks.
 template <std::size_t count>
 std::array<double, count> over_ranks(MPI_Comm comm, std::array<double, count> largest) {

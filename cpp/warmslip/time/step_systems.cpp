@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "warmslip/fem/supports.hpp"
+#include "warmslip/time/roundoff.hpp"
 
 namespace warmslip {
 namespace {
@@ -25,11 +26,7 @@ double largest_diagonal(Mat a) {
 // node's mass.
 bool mass_holds(Mat inertia, double k, int width, Mat a) {
   if (!inertia) return false;
-  VecHandle ones, masses;
-  WARMSLIP_PETSC(MatCreateVecs(inertia, ones.out(), masses.out()));
-  WARMSLIP_PETSC(VecSet(ones, 1));
-  multiply(inertia, ones, masses);
-  const VecHandle diagonal = diagonal_of(a);
+  const VecHandle masses = row_sums(inertia), diagonal = diagonal_of(a);
   const Eigen::Index block = block_size(masses);
   Values entries(diagonal), held(masses);
   const Eigen::Index nodes = (*entries).size() / width;

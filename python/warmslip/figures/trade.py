@@ -13,7 +13,7 @@ from warmslip.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, 
 from warmslip.records import tables
 
 EQUAL = 1.1  # ratio up to which two CPU times are one
-ORDINARY, FACTORED = "ordinary Newton", "SciPy, factored once"  # equal steps by other codes
+ORDINARY, FACTORED = OTHERS = ("ordinary Newton", "SciPy, factored once")  # equal steps by other codes
 LOOKS = {  # name, the keys that make it, colour and marker
     "equal steps": ("time.steps", INK, "o"),
     "equal steps, lagged": ("time.coupling=lagged", GREY, "h"),
@@ -71,7 +71,7 @@ def _panel(ax: Any, rows: list[tables.Row], key: str) -> dict[str, Any]:
         own = [row for row in rows if row["method"] == method and row[key] > 0]
         if own:
             x, y = [row["cpu_seconds"] for row in own], [row[key] for row in own]
-            dashes = (0, (1, 1)) if method in (ORDINARY, FACTORED) else "-"
+            dashes = (0, (1, 1)) if method in OTHERS else "-"
             (handles[f"{method} ({keys})"],) = ax.loglog(
                 x, y, color=colour, marker=marker, mec="white", mew=0.4, lw=1.2, ls=dashes
             )
@@ -93,7 +93,7 @@ def _best(name: str, rows: list[tables.Row]) -> str:
     """How much cheaper than the finest run with equal steps, and than an ordinary Newton, the error of that run can be had."""
     equal = [row for row in rows if row["method"] == "equal steps"]
     finest = max(equal, key=lambda row: row["n"])
-    ours = [row for row in rows if row["method"] in LOOKS and row["method"] not in (ORDINARY, FACTORED)]
+    ours = [row for row in rows if row["method"] in LOOKS and row["method"] not in OTHERS]
     best = min((row for row in ours if row["e_sum"] <= finest["e_sum"]), key=lambda row: row["cpu_seconds"])
     gain = finest["cpu_seconds"] / best["cpu_seconds"]
     text = (

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from warmslip import figures
-from warmslip.figures.trade import ERRORS, FACTORED, LOOKS, ORDINARY
+from warmslip.figures.trade import ERRORS, LOOKS, ORDINARY, OTHERS
 from warmslip.records import tables
 from warmslip.studies.tradeoff import METHODS
 
@@ -57,4 +57,4 @@ def test_a_caption_claims_no_gain_where_there_is_none(tmp_path: Path) -> None:
 
 
 def test_every_method_has_its_look() -> None:
-    assert set(LOOKS) == {*METHODS, ORDINARY, FACTORED}
+    assert set(LOOKS) == {*METHODS, *OTHERS}

@@ -163,6 +163,14 @@ def test_meshes_in_space_may_be_as_coarse_as_their_pilots() -> None:
     assert min(one.cells for one in runs.settings("uniform", "equal")) == 4
 
 
+def test_errors_are_raised_where_waves_jump() -> None:
+    for number, factor in ((14, 1.25), (10, 1.0)):  # without viscosity, and without inertia
+        runs = pilots.Pilots(asked.scene(number), ["u_V"], lambda _: None)
+        assert runs.total("u_V", 0.3, 0.4) == pytest.approx(factor * 0.7, rel=1e-15)
+        runs.power["u_V"] = 2.0
+        assert runs.total("u_V", 0.3, 0.4) == pytest.approx(factor * 0.5, rel=1e-15)
+
+
 def test_waves_without_damping_need_three_graded_meshes() -> None:
     """Their errors in space grow with the number of steps, and pilots have few."""
     runs = pilots.Pilots(asked.scene(14), ["u_V"], lambda _: None)
