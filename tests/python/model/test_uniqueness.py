@@ -1,35 +1,25 @@
-"""How many solutions a step has: the bound against the exact value, loads below and beyond it, and what the core finds.
-
-`python test_uniqueness.py` checks on the ranks it has that a run says how much friction leaves one solution.
-"""
+"""How many solutions a step has: the bound against the exact value, and loads below and beyond it."""
 
 from __future__ import annotations
 
 import itertools
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support.processes import child_environment
+from support.pieces import scaled, turned_piece
 
-import warmslip
-from warmslip import Scene
 from warmslip.model import several_solutions
-from warmslip.model.discretisation import discretise
 from warmslip.model.linear_pieces import Solution, exact, solutions
 from warmslip.model.uniqueness import ContactPoints, bound
-from warmslip.report import cost
-from warmslip.scene import plausibility
-from warmslip.scene.reader import build, load
+from warmslip.scene.reader import load
 from warmslip.simulation.simulation import Simulation
-from warmslip.simulation.summary import summary
 
 Array = Any
+
+
 MOST = 8  # points whose statuses are all looked at
 
 
@@ -44,10 +34,6 @@ def random_points(rng: Any, n: int, d: int = 2, rigid: bool = False) -> ContactP
         stiffness=np.full(n, np.inf) if rigid else 10 ** rng.uniform(0, 4, n),
         friction=rng.uniform(0.5, 1.0, n),
     )
-
-
-def scaled(points: ContactPoints, factor: float) -> ContactPoints:
-    return replace(points, friction=factor * points.friction)
 
 
 def of_scene(name: str, **keys: Any) -> ContactPoints:
@@ -84,52 +70,6 @@ def law_defect(points: ContactPoints, found: Solution, free: Array, penetration:
     cone = np.maximum(np.abs(pull) - limit, 0.0).max() + np.maximum(-pressure, 0.0).max()
     held = np.abs(limit * np.abs(slip) - pull * slip).max()
     return float(max(normal / velocities, cone / forces, held / (forces * velocities)))
-
-
-def turned_piece(points: ContactPoints) -> tuple[Array, Array] | None:
-    """Free velocity and penetration of a step inside a piece whose determinant is negative; None where there is none.
-
-    Every point is open, sticks, or slips one way; the piece's matrix takes normal and tangential forces to what its status fixes.
-    """
-    n, nu = len(points.weights), points.normals
-    tau = np.column_stack([-nu[:, 1], nu[:, 0]])
-    give = 1 / (points.weights * points.stiffness * points.step)
-    for status in itertools.product((0, 1, 2, 3), repeat=n):
-        basis, rows = [], []  # directions of the forces that the status leaves free, and what is then prescribed
-        for i, one in enumerate(status):
-            across, along = np.zeros((n, 2)), np.zeros((n, 2))
-            across[i], along[i] = nu[i], tau[i]
-            if one == 1:
-                basis += [across.ravel(), along.ravel()]
-                rows += [across.ravel(), along.ravel()]
-            elif one > 1:
-                basis.append((across + (1 if one == 2 else -1) * points.friction[i] * along).ravel())
-                rows.append(across.ravel())
-        if not rows:
-            continue
-        total = points.compliance + sum(np.outer(v, v) * g for v, g in zip(_normal(nu), give, strict=True))
-        if np.linalg.det(np.array(rows) @ total @ np.array(basis).T) >= 0:
-            continue
-        force, slip = np.zeros((n, 2)), np.zeros(n)
-        apart = np.zeros(n)
-        for i, one in enumerate(status):
-            sign = {2: 1.0, 3: -1.0}.get(one, 0.0)
-            force[i] = (one > 0) * (nu[i] + sign * points.friction[i] * tau[i])
-            slip[i], apart[i] = sign, one == 0
-        pressure = np.sum(force * nu, axis=1)
-        moved = (points.compliance @ force.ravel()).reshape(n, 2)
-        scale = np.abs(moved).max()
-        w = scale * slip[:, None] * tau
-        r = np.where(apart, -scale * points.step, pressure / (points.weights * points.stiffness))
-        return w + moved, r  # w has no normal part
-    return None
-
-
-def _normal(normals: Array) -> Iterator[Array]:
-    for i, nu in enumerate(normals):
-        out = np.zeros_like(normals)
-        out[i] = nu
-        yield out.ravel()
 
 
 def test_one_point_is_klarbrings() -> None:
@@ -198,23 +138,6 @@ def test_a_point_that_cannot_slip_takes_no_part(axes: tuple[int, int]) -> None:
     there[:2, :2], there[2 + axes[0], 2 + axes[0]] = c[:2, :2], 2.0
     assert bound(points(there)) == pytest.approx(bound(one), rel=1e-6)
     assert bound(points(there[2:, 2:])) == np.inf
-
-
-def test_a_run_ends_where_parts_meet_at_a_held_corner() -> None:
-    contact = [{"part": "bottom", "stiffness": 1.0}, {"part": "left", "stiffness": 1.0, "quadrature": "gauss-2"}]
-    contact[1]["friction"] = {"coefficient": 1.0}
-    scene = build(
-        {
-            "mesh": {"n": [3, 1]},
-            "time": {},
-            "elasticity": {"lame": [1.0, 1.0]},
-            "supports": {"points": [{"at": [0.0, 0.0]}], "displacement": {"top": ["free", 0.0]}},
-            "contact": contact,
-        }
-    )
-    simulation = Simulation(scene)
-    assert list(simulation.steps()) and all(np.isfinite(one) for one in simulation.statistics.residuals.values())
-    assert not [one for one in summary(simulation)["warnings"] if "nan" in one]
 
 
 def test_beyond_it_a_load_has_several_that_satisfy_the_law() -> None:
@@ -292,151 +215,3 @@ def test_in_space_a_plane_problem_has_its_own_bound() -> None:
         normals[:, kept] = plane.normals
         solid = replace(plane, compliance=c.reshape(9, 9), normals=normals)
         assert bound(solid) == pytest.approx(bound(plane), rel=5e-2)
-
-
-def step_from(scene: Scene, starts: list[Array], force: Array | None, penetration: Array | None) -> list[Array]:
-    """Contact forces (points, d) of one step of the core from other forces of the step before, (points, d).
-
-    The foundation is rigid: it stores no energy, and the balances close from any forces.
-    """
-    d = discretise(scene)
-    out = []
-    for start in starts:
-        stepper = d.stepper()
-        stepper.resume(start.ravel(), [1] * len(start), [0.0] * 18, 0)
-        loads = list(d.load_vectors.at(scene.step, scene.step))
-        if force is not None:
-            vector = d.layout.vector(d.dim)
-            d.layout.distribute(force.ravel(), vector)
-            loads[0], loads[2] = vector, -penetration
-        report = stepper.advance(*loads)
-        assert report.outcome.name == "completed", report.reason
-        out.append(np.reshape(stepper.contact_force, (-1, d.dim)))
-    return out
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_the_core_finds_the_one_solution_from_any_forces(d: int) -> None:
-    scene = load("quasistatic_punch" if d == 2 else "block_3d").override(
-        **{"mesh.n": 4, "time.steps": 4, "contact.stiffness": "rigid"}
-    )
-    simulation = Simulation(scene)
-    factor = several_solutions.of_scene(simulation.discretisation, simulation.stepper).factor
-    assert factor > 1
-    scene = scene.override(**{"contact.friction.coefficient": 0.98 * factor * scene.contacts[0].friction.coefficient})
-    rng, n = np.random.default_rng(d), len(simulation.discretisation.surface.weights)
-    starts = [10 ** rng.uniform(-3, 2) * rng.normal(size=(n, d)) for _ in range(12)]
-    forces = step_from(scene, starts, None, None)
-    largest = np.abs(forces[0]).max()
-    assert largest > 0
-    assert max(np.abs(one - forces[0]).max() for one in forces) < 1e-9 * largest
-
-
-PUNCH: dict[str, Any] = {"mesh.n": 4, "supports.displacement": ["top"], "contact.stiffness": "rigid"}
-
-
-def test_the_core_finds_two_solutions_beyond_it() -> None:
-    """A load on the contact nodes of a small body that is made to have several solutions: the core finds those it starts near."""
-    scene = load("quasistatic_punch").override(**PUNCH)
-    simulation = Simulation(scene)
-    rough = scaled(several_solutions.condensed(simulation.discretisation, simulation.stepper), 1 / 0.3)
-    factor = 1.2 * exact(rough)
-    rough, scene = scaled(rough, factor), scene.override(**{"contact.friction.coefficient": factor})
-    asked = turned_piece(rough)
-    assert asked is not None
-    free, penetration = asked
-    known = solutions(rough, free, penetration)
-    assert len(known) >= 2
-    d = discretise(scene)
-    nodes, places = np.asarray(d.mesh.nodes), np.asarray(d.surface.positions)
-    force = np.zeros_like(nodes)
-    at = [int(np.argmin(np.linalg.norm(nodes - one, axis=1))) for one in places]
-    force[at] = np.linalg.solve(rough.compliance, free.ravel()).reshape(-1, 2)
-    forces = step_from(scene, [one.force for one in known], force, penetration)
-    size = max(np.abs(one.force).max() for one in known)
-    reached = {min(range(len(known)), key=lambda i, f=f: np.abs(known[i].force - f).max()) for f in forces}
-    assert all(min(np.abs(one.force - f).max() for one in known) < 1e-9 * size for f in forces)
-    assert len(reached) >= 2
-
-
-def test_the_points_of_a_step_are_those_the_core_had() -> None:
-    """`several_solutions.posed` and `solutions` give the forces of the run, of a body with a support and of one that flies."""
-    drop = build(
-        {
-            "mesh": {"shape": "square", "n": 3},
-            "time": {"end": 0.3, "steps": 30},
-            "inertia": {"density": 1.0},
-            "elasticity": {"lame": [10.0, 50.0]},
-            "initial": {"velocity": [0.4, -1.0]},
-            "contact": {"part": "bottom", "stiffness": 2e3, "gap": 0.02, "friction": {"coefficient": 0.3}},
-        }
-    )
-    for scene in (drop, load("quasistatic_punch").override(**{"mesh.n": 5, "time.steps": 8})):
-        simulation, touched = Simulation(scene), 0
-        for _, report in simulation.steps():
-            touched += report.stick + report.slip
-            points, free, penetration = several_solutions.posed(simulation.discretisation, simulation.stepper)
-            (one,) = solutions(points, free, penetration)
-            force = np.reshape(simulation.stepper.contact_force, (-1, 2))
-            assert np.abs(one.force - force).max() <= 1e-8 * np.abs(force).max()
-            if np.abs(force).max() > 1e-6:
-                assert [status > 0 for status in one.status] == [status > 0 for status in simulation.stepper.status]
-        assert touched > 10
-
-
-def rough_and_smooth() -> tuple[list[str], list[str]]:
-    """Warnings of a scene whose friction is far beyond the bound and of one below it (collective)."""
-    out = []
-    for mu in (1.5, 0.2):
-        scene = load("quasistatic_punch").override(**{"mesh.n": 6, "time.steps": 8, "contact.friction.coefficient": mu})
-        out.append([one for one in warmslip.run(scene).summary["warnings"] if "one solution" in one])
-    return out[0], out[1]
-
-
-def test_a_run_says_that_a_step_may_have_several() -> None:
-    (output,), none = rough_and_smooth()
-    assert not none
-    assert output.startswith("the friction coefficient is 1.5, and every step has one solution up to 0.")
-    assert "Newton's method takes the one it reaches from the forces of the step before" in output
-    assert "another start" not in output
-    told_of_starts = plausibility.several(2.0, 1.09, sharp=False, timed=True, now=(3, "1.4"), other=2, steps=9)[0]
-    assert "surely has one solution up to 1 only (1.4 if the 3 points" in told_of_starts
-    assert "(from another start in 2 of 9 steps); take shorter steps," in told_of_starts
-    assert output.endswith(
-        "take a softer foundation or a smaller coefficient"
-    )  # no inertia: shorter steps would not help
-
-
-def test_explain_says_how_much_friction_leaves_one() -> None:
-    scene = load("paper_mixed").override(**{"mesh.n": 8, "time.steps": 8})
-    (message,) = [one for one in cost.measured(scene).every_step if "one solution" in one]
-    simulation = Simulation(scene)
-    most = bound(
-        replace(several_solutions.condensed(simulation.discretisation, simulation.stepper), friction=np.ones(9))
-    )
-    assert message.startswith("friction: one solution in every step for mu up to ")
-    stated = float(message.removeprefix("friction: one solution in every step for mu up to ").split(";")[0])
-    assert 0.9 * most <= stated <= most
-    assert message.endswith("this scene has 0.2")
-    for keys, words in (
-        ({"contact.friction": {"cohesion": 1.0}}, []),
-        ({"contact.friction": {"coefficient": 0.5, "kinetic": 0.2, "speed": 1.0}}, ["depends on the slip speed"]),
-        ({"contact.stiffness": "rigid", "contact.quadrature": "gauss-2"}, ["share their forces in many ways"]),
-    ):
-        output = [one for one in cost.measured(scene.override(**keys)).every_step if "one solution" in one]
-        assert len(output) == len(words)
-        assert all(word in one for word, one in zip(words, output, strict=True))
-
-
-@pytest.mark.mpi
-def test_two_ranks_say_the_same() -> None:
-    command = ["mpirun", "-n", "2", sys.executable, str(Path(__file__).resolve())]
-    result = subprocess.run(
-        command, env=child_environment(), text=True, capture_output=True, timeout=300, check=False, cwd=Path.cwd()
-    )
-    assert result.returncode == 0, result.stdout + result.stderr
-    assert result.stdout.count(str(rough_and_smooth())) == 2, result.stdout
-
-
-if __name__ == "__main__":
-    print(rough_and_smooth(), flush=True)

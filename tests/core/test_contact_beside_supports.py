@@ -1,0 +1,179 @@
+"""Contact of bodies that supports hold in part. `python test_contact_beside_supports.py D` checks on its ranks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support.boxes import along, body, completed, elasticity, field, turned
+from support.guided import SIDES, guides, planes, pressed
+from support.ranked import Checks
+
+from warmslip import discretise
+from warmslip.simulation.simulation import Simulation
+
+check = Checks()
+
+
+@check
+def weak_and_stiff_springs(d: int) -> None:
+    """Springs that only keep a pressed body from sliding away leave its weight to the contact; stiff ones guide it.
+
+    The axes may lie askew to the body: rounding of a force along one side is then part of that along the other.
+    """
+    turn = np.linalg.qr(np.array([[0.8, -0.6, 0.1], [0.5, 0.7, -0.3], [0.2, 0.4, 0.9]])[:d, :d])[0]
+    turn *= np.linalg.det(turn) if d == 3 else [np.linalg.det(turn), 1.0]
+    sides = [*SIDES[d], *(["right"] if d == 2 else ["right", "back"])]
+    contact = {"part": "bottom", "stiffness": 1e3, "friction": {"coefficient": 0.3}}
+    cases: list[tuple[dict[str, float], float]] = [
+        ({"stiffness": 10.0**-n}, 1e-3) for n in ((4, 5, 6) if d == 2 else (4, 5))
+    ]
+    for spring, share in [*cases, ({"normal_stiffness": 1e6}, 1e-9)]:
+        ends = []
+        for axes in (np.eye(d), turn):
+            one = pressed(
+                d,
+                {},
+                n=4 if d == 2 else 3,
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"springs": dict.fromkeys(sides, spring)},
+                loads={"body": along(d, -0.01, 0.003)},
+                contact=contact,
+            )
+            there, mesh = turned(one, axes)
+            weakest = spring.get("stiffness", 1.0) < 1e-4  # the sliding that they leave drowns the strain
+            simulation = completed(there, digits=7.0, mesh=mesh, residual=1e-10 if weakest else 1e-11)
+            assert simulation.report.normal_force == pytest.approx(0.01, rel=share)
+            ends.append(field(simulation, "u") @ axes)
+        assert np.abs(ends[1] - ends[0]).max() <= 1e-7 * np.abs(ends[0]).max(), spring
+    penalty = pressed(
+        d,
+        {},
+        n=4 if d == 2 else 3,
+        elasticity=elasticity(d, 1.0, 0.3),
+        supports={"springs": {side: {"normal_stiffness": 1e7} for side in sides}},
+        loads={"body": along(d, -0.01, 0.003)},
+        contact=contact,
+    )
+    one, mesh = turned(penalty, turn)
+    simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
+    assert len(list(simulation.steps())) == 4, simulation.failure
+
+
+@check
+def a_strip_pinched_between_two_foundations(d: int) -> None:
+    """Forces from both sides each move a strip far that a weak spring holds, and together press it evenly."""
+    sides = [[4.0, 0.1], [4.0, 1.0, 0.1]][d - 2]
+    modulus = 1 / (1 - 0.3**2) if d == 2 else 1.0  # across the strip, which is free to widen
+    for stiffness in (1e2, 1e4, 1e7):
+        for spring in (1e-3, 1.0):
+            one = pressed(
+                d,
+                {},
+                mesh=body(d, 2) | {"lengths": sides},
+                time={"steps": 1},
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"springs": {"left": {"stiffness": spring}}},
+                contact=[
+                    {"part": "top", "stiffness": "rigid"},
+                    {"part": "bottom", "stiffness": stiffness, "gap": -2.8e-7},
+                ],
+            )
+            simulation = completed(one, digits=6.0)
+            force = np.asarray(simulation.stepper.contact_force).reshape(-1, d)[:, d - 1]
+            area = np.prod(sides[:-1])
+            even = 2.8e-7 * area / (0.1 / modulus + 1 / stiffness)
+            assert [-force[force < 0].sum(), force[force > 0].sum()] == pytest.approx([even] * 2, rel=0.02)
+
+
+@check
+def points_whose_nodes_are_held_in_different_ways(d: int) -> None:
+    """A direction in which a roller holds one node and a clamp the other is held at the points between, whatever the law."""
+    held: dict[str, Any] = {"left": [0.0, *["free"] * (d - 1)]}
+    if d == 3:
+        held |= {"front": ["free", 0.0, "free"], "back": ["free", 0.0, "free"]}
+    smooth = {"coefficient": 0.0}
+    for quadrature in ("gauss-1", "gauss-2"):
+        ends = []
+        rough = [{"coefficient": 0.3, "regularisation": 1e-3}] if d == 2 else []  # in space some points slip
+        for friction in (smooth, smooth | {"regularisation": 1e-3}, *rough):
+            one = pressed(
+                d,
+                {},
+                n=1,
+                elasticity=elasticity(d, 1.0, 0.3),
+                supports={"displacement": held, "points": [{"at": [1.0] * d}]},
+                loads={"body": along(d, 0.002)},
+                contact={"part": "top", "stiffness": "rigid", "quadrature": quadrature, "friction": friction},
+            )
+            ends.append(field(completed(one), "u"))
+        assert ends[0].any()
+        for u in ends[1:]:
+            assert np.abs(u - ends[0]).max() <= 1e-9 * np.abs(ends[0]).max()
+
+
+@check
+def a_hard_inset_of_a_body_on_rollers(d: int) -> None:
+    """A contact bears a body that rollers guide, whatever the stiffness of a part of it: it ends as that of a rigid one."""
+    ends = []
+    for young in (1e6, 1e8, 1e10):
+        hard = {"where": "abs(x - 0.5) < 0.3", "elasticity": elasticity(d, young, 0.0)}
+        one = pressed(
+            d,
+            planes(d),
+            n=[6, *[2] * (d - 1)],
+            mesh=body(d, [6, *[2] * (d - 1)]) | {"lengths": [1.0, *[0.1] * (d - 1)]},
+            elasticity=elasticity(d, 1.0, 0.0),
+            regions={"hard": hard},
+            loads={"body": along(d, -0.0075)},
+            contact={"part": "bottom", "stiffness": 2.0},
+        )
+        simulation = completed(one, digits=4.0)
+        assert simulation.report.normal_force == pytest.approx(0.0075 * 0.1 ** (d - 1), rel=1e-9)
+        ends.append(field(simulation, "u"))
+    for u in ends[1:]:
+        assert np.abs(u - ends[0]).max() <= 1e-5 * np.abs(ends[0]).max()
+
+
+@check
+def points_beside_a_roller_share_the_least_friction(d: int) -> None:
+    """Points at rest have the friction of least size that puts what it does on what the roller leaves free."""
+    for n, quadrature, inclined in ((1, "gauss-2", False), (2, "gauss-3" if d == 2 else "gauss-2", True)):
+        contact = {"part": "bottom", "quadrature": quadrature, "stiffness": 1.0, "friction": {"coefficient": 4.0}}
+        top = ["free"] * (d - 1) + ["-0.05 * t"]
+        held = planes(d) if not inclined else guides(d)
+        simulation = completed(
+            pressed(d, held | {"top": top}, n=n, contact=contact, loads={"body": along(d, 0.0, -0.05)})
+        )
+        surface, stepper = simulation.discretisation.surface, simulation.stepper
+        x = np.asarray(simulation.discretisation.mesh.nodes)
+        force = np.asarray(stepper.contact_force).reshape(-1, d)
+        assert set(stepper.status) == {1}  # all stick
+        facets = np.asarray(simulation.discretisation.mesh.parts["bottom"])
+        nodes = np.unique(facets)
+        positions, weights = np.asarray(surface.positions), np.asarray(surface.weights)
+        shape = shapes(x, facets, nodes, positions)
+        for axis in range(d - 1):
+            free = shape * (x[nodes, axis] > 1e-12)
+            least = (
+                weights[:, None] * free @ np.linalg.pinv(free.T @ (weights[:, None] * free)) @ free.T @ force[:, axis]
+            )
+            assert np.abs(force[:, axis] - least).max() <= 1e-9 * np.abs(force).max()
+            assert np.abs(least).max() > 1e-3 * np.abs(force).max()
+
+
+def shapes(x: Any, facets: Any, nodes: Any, positions: Any) -> Any:
+    """Shape functions of the nodes of a flat part at the points on it, (points, nodes); points come facet by facet."""
+    out, each = np.zeros((len(positions), len(nodes))), len(positions) // len(facets)
+    for q, place in enumerate(positions):
+        corners = facets[q // each]
+        system = np.vstack([x[corners].T, np.ones(len(corners))])
+        out[q, np.searchsorted(nodes, corners)] = np.linalg.lstsq(system, np.append(place, 1.0), rcond=None)[0]
+    return out
+
+
+test_on_one_rank, test_on_two_ranks = check.tests(__file__)
+
+if __name__ == "__main__":
+    check.main()
