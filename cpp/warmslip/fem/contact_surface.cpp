@@ -132,6 +132,8 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
   scalar_shape_.setFromTriplets(scalar_shape.begin(), scalar_shape.end());
   moving_shape_ = (shape_ * free_).pruned();
   held_ = Eigen::MatrixXd::Zero(count * d, d);
+  std::vector<Eigen::Triplet<double>> across;  // the directions in which each point is not held
+  int directions = 0;
   for (Eigen::Index q = 0; q < count; ++q) {
     Tensor2<d> left = Tensor2<d>::Zero();  // a direction is held where all nodes about the point hold it
     prescribed_.push_back(true);
@@ -139,23 +141,17 @@ ContactSurface<d>::ContactSurface(const Layout<d>& layout, const Problem<d>& pro
       if (!fixed[static_cast<std::size_t>(entry.col())]) prescribed_.back() = false;
       left += Tensor2<d>::Identity() - held_at(nodes_[static_cast<std::size_t>(entry.col())]);
     }
-    Tensor2<d> held = Tensor2<d>::Zero();
+    if (prescribed(q)) continue;
     const Eigen::SelfAdjointEigenSolver<Tensor2<d>> frame(left);
-    for (int a = 0; a < d; ++a)
-      if (frame.eigenvalues()[a] < 1e-12) held += frame.eigenvectors().col(a) * frame.eigenvectors().col(a).transpose();
-    if (!prescribed_.back()) held_.template middleRows<d>(q * d) = held;
-  }
-
-  std::vector<Eigen::Triplet<double>> across;  // the directions in which each point is not held
-  int directions = 0;
-  for (Eigen::Index q = 0; q < count; ++q) {
-    const Eigen::SelfAdjointEigenSolver<Tensor2<d>> frame(held_.template middleRows<d>(q * d));
-    for (int a = 0; a < d; ++a)
-      if (!prescribed(q) && frame.eigenvalues()[a] < 0.5) {
-        for (int b = 0; b < d; ++b)
-          across.emplace_back(directions, static_cast<int>(q) * d + b, frame.eigenvectors()(b, a));
+    for (int a = 0; a < d; ++a) {
+      const Point<d> direction = frame.eigenvectors().col(a);
+      if (frame.eigenvalues()[a] < 1e-12) {
+        held_.template middleRows<d>(q * d) += direction * direction.transpose();
+      } else {
+        for (int b = 0; b < d; ++b) across.emplace_back(directions, static_cast<int>(q) * d + b, direction[b]);
         ++directions;
       }
+    }
   }
   Eigen::SparseMatrix<double, Eigen::RowMajor> released(directions, count * d);
   released.setFromTriplets(across.begin(), across.end());
