@@ -8,6 +8,7 @@ import pytest
 from campaign import ordinary_newton
 from reference import skfem_scheme
 
+from warmslip.figures.trade import FACTORED
 from warmslip.studies.tradeoff import CONTESTS
 
 
@@ -25,7 +26,7 @@ def test_its_answer_is_ours(contest: str) -> None:
 
 
 def test_scipy_has_the_same_answer_with_two_factors() -> None:
-    point = ordinary_newton.point("paper_hot", like(8), ordinary_newton.FACTORED)
+    point = ordinary_newton.point("paper_hot", like(8), FACTORED)
     assert point["from_ours"] < ordinary_newton.SAME and point["factorizations"] == 2
     assert point["e_sum"] == 0.25 and point["cpu_seconds"] != 0.1
 
