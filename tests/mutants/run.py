@@ -62,8 +62,8 @@ class Fault(NamedTuple):
 
 class Found(NamedTuple):
     fault: Fault
-    outcome: str  # killed, survived, invalid
-    by: str
+    outcome: str  # killed, survived, invalid, untried
+    by: str  # of an untried fault: who killed it when its text was another
     commit: str = ""  # at which it was tried
 
 
@@ -119,12 +119,12 @@ class Tree:
         error = re.search(r"error: .*", result.stdout + result.stderr)
         return "" if result.returncode == 0 else error[0] if error else "the build failed"
 
-    def failures(self, *, every: bool, near: str = "", born: Sequence[str] = ()) -> list[str]:
-        """The tests that fail: the first, or all of them. Those that came with the fault (`born`) and those that name the Python
-        module `near` come first, without one those of the core itself."""
+    def failures(self, *, every: bool, near: str = "", first: Sequence[str] = ()) -> list[str]:
+        """The tests that fail: the first, or all of them. The files in `first` and those that name the Python module `near`
+        come first, without one the native tests of the core."""
         found = [] if near else self._native(f"--test-case-exclude={STORED}")
         if not found or every:
-            found += self._python(near, born, every=every)
+            found += self._python(near, first, every=every)
         if not found or every:
             found += self._native() if near else self._native(f"--test-case={STORED}")
         return list(dict.fromkeys(found))
@@ -134,7 +134,7 @@ class Tree:
         found = [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", tests.stdout)]
         return found or self._crash(tests)
 
-    def _python(self, near: str, born: Sequence[str], *, every: bool) -> list[str]:
+    def _python(self, near: str, first: Sequence[str], *, every: bool) -> list[str]:
         # of the mathematics first
         files = [
             p
@@ -143,7 +143,7 @@ class Tree:
         ]
         files.sort(
             key=lambda path: (
-                str(path.relative_to(self.at)) not in born,
+                str(path.relative_to(self.at)) not in first,
                 not (near and re.search(rf"\b{near}\b", path.read_text())),
             )
         )
@@ -183,7 +183,8 @@ class Tree:
             failed += json.loads(written.read_text())["failed"]
         return failed or (["it did not run"] if result.returncode else [])
 
-    def judge(self, fault: Fault, *, every: bool, workflow: bool) -> Found:
+    def judge(self, fault: Fault, first: Sequence[str], options: argparse.Namespace) -> Found:
+        """What finds the fault; the files of tests in `first` run before the others."""
         path = self.at / fault.file
         original = path.read_text()
         path.write_text(original.replace(fault.old, fault.new))
@@ -192,8 +193,8 @@ class Tree:
             if error:
                 return Found(fault, "invalid", error)
             python = fault.file.endswith(".py")
-            failed = self.failures(every=every, near=path.stem if python else "", born=born_with(fault))
-            if workflow:
+            failed = self.failures(every=options.every, near=path.stem if python else "", first=first)
+            if options.workflow:
                 failed += [f"workflow: {name}" for name in self.verdict()]
             return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
         except RuntimeError as error:
@@ -224,6 +225,7 @@ def main() -> int:
         parser.error(f"unknown faults: {', '.join(sorted(unknown))}")
     table = read(options.out) if options.resume and options.out else {}
     chosen = [f for f in chosen if f.name not in table]
+    earlier = killers(options.out or TABLE)
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, Progress() as progress:
         jobs = min(options.jobs, len(chosen))
@@ -242,7 +244,9 @@ def main() -> int:
         def one(fault: Fault) -> Found:
             tree = trees.get()
             try:
-                found = tree.judge(fault, every=options.every, workflow=options.workflow)
+                found = tree.judge(
+                    fault, first=[*files_in(earlier.get(fault.name, "")), *born_with(fault)], options=options
+                )
             finally:
                 trees.put(tree)
             progress.print(f"{fault.name}: {found.outcome}, {found.by}", markup=False, highlight=False)
@@ -251,7 +255,7 @@ def main() -> int:
             found = found._replace(commit=commit())
             with writing:
                 table[fault.name] = found
-                write(options.out, table)
+                write(options.out, table, earlier)
             return found
 
         writing = Lock()
@@ -311,7 +315,20 @@ def read(path: Path) -> dict[str, Found]:
     }
 
 
-def write(path: Path | None, table: dict[str, Found]) -> None:
+def killers(path: Path) -> dict[str, str]:
+    """Who killed a fault of this name the last time, whatever its text was then."""
+    if not path.exists():
+        return {}
+    with path.open(newline="") as file:
+        return {row["fault"]: row["by"] for row in csv.DictReader(file) if row["outcome"] in {"killed", "untried"}}
+
+
+def files_in(by: str) -> list[str]:
+    """The files of the Python tests that a line of the table names."""
+    return [f"tests/{name}" for name in re.findall(r"\S+/test_\w+\.py(?=::)", by)]
+
+
+def write(path: Path | None, table: dict[str, Found], earlier: dict[str, str]) -> None:
     """The table so far, in the order of faults.toml."""
     if path is None:
         return
@@ -319,7 +336,7 @@ def write(path: Path | None, table: dict[str, Found]) -> None:
     with path.open("w", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(["fault", "file", "what", "outcome", "by", "commit", "key"])
-        found = [table.get(fault.name, Found(fault, "untried", "")) for fault in faults()]
+        found = [table.get(fault.name, Found(fault, "untried", earlier.get(fault.name, ""))) for fault in faults()]
         lines.writerows(
             [f.fault.name, f.fault.file, f.fault.what, f.outcome, f.by, f.commit, f.fault.key] for f in found
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from pathlib import Path
 
 from support.folders import TESTS
 
@@ -21,3 +22,14 @@ def test_every_fault_applies() -> None:
         source = (run.ROOT / fault.file).read_text().replace(fault.old, fault.new)
         if fault.file.endswith(".py"):
             ast.parse(source)
+
+
+def test_earlier_killers_run_first(tmp_path: Path) -> None:
+    fault, *_ = run.faults()
+    by = "core/test_rates.py::test_case[a-1]; ctest: something; python/io/test_plot.py::test_x"
+    run.write(tmp_path / "table.csv", {}, {fault.name: by})  # untried with its present text
+    assert run.read(tmp_path / "table.csv") == {}
+    assert run.files_in(run.killers(tmp_path / "table.csv")[fault.name]) == [
+        "tests/core/test_rates.py",
+        "tests/python/io/test_plot.py",
+    ]
