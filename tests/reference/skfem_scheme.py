@@ -185,6 +185,11 @@ def simulate(
         )
         w = y[:size]
         u = u + k * w
+    return final(on, ops, u, w, theta, friction, pressure)
+
+
+def final(on: Space, ops: Operators, u: Any, w: Any, theta: Any, friction: Any, pressure: Any) -> dict[str, float]:
+    """Norms of the fields, and the force on the body over Gamma_C, by name."""
     plain = ops.inertia / RHO
     return {
         "u_V": float(np.sqrt(u @ STRAIN.assemble(on.vector) @ u)),

@@ -67,6 +67,7 @@ PANELS: dict[str, tuple[tuple[str, Any], ...]] = {
         ("extremes", study.extremes),
         ("blocks", study.blocks),
         ("trade", study.trade),
+        ("front", study.front),
         ("schema", scene.schema),
     ),
     "Reproduce the paper": (

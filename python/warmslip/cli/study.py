@@ -269,3 +269,22 @@ def trade(
 
     tables.write(out, rows, stamp(None, contest=contest))
     typer.echo(f"{len(rows)} runs in {out}")
+
+
+def front(
+    contests: Annotated[list[Path], typer.Argument(help="tables of `warmslip trade`, called trade_CONTEST.csv")],
+    out: Csv,
+) -> None:
+    """List the settings that err less than every cheaper one, with what is typed for them."""
+    from warmslip.studies import tradeoff
+    from warmslip.studies.refinement_study import stamp
+
+    _writable(out)
+    rows = []
+    for path in contests:
+        found, name = tables.read(path), path.stem.removeprefix("trade_")
+        for quantity in ("e_sum", "e_normal_force"):
+            rows += tradeoff.front(name, found, quantity)
+    tables.write(out, rows, stamp(None))
+    sums = [row for row in rows if row["quantity"] == "e_sum"]
+    typer.echo(tables.aligned(sums, ["contest", "error", "cpu_seconds", "method", "n"]))

@@ -21,6 +21,7 @@ from warmslip.studies.error_norms import TERMS
 from warmslip.studies.recording import Recording, seconds
 
 Keys = dict[str, Any]
+COMPLETED, NAN = "completed", float("nan")  # outcome of a run; a number that it does not have
 CORNERS: Keys = {"mesh.graded_to": ["corners"]}
 
 
@@ -109,6 +110,7 @@ KNOBS = ["equal steps, soft foundation", "equal steps, rigid foundation", "equal
 STEPPING = ["equal steps", "graded steps", "more graded steps", "adaptive steps", "adaptive steps, smaller tolerance"]
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 LEVELS = [8, 16, 20, 24, 32, 64, 128]  # of the paper's problem
+WORTH = 0.9  # ratio of errors from which on a dearer setting is worth a line of the front
 FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
     "paper_cold": Contest("paper_mixed", {}, list(METHODS), LEVELS, 192),
@@ -145,7 +147,10 @@ CONTESTS = {
 
 def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[Row]:
     """A row for every method and level, and two for the reference: `reference`, and `reference, half`, whose errors estimate its
-    own. Raises RuntimeError when a run is rejected."""
+    own. A run that stops has a row without numbers, whose `outcome` says why.
+
+    Raises RuntimeError when the reference is rejected.
+    """
     kind = "graded mesh and steps" if contest.graded else "equal steps"
     if contest.graded and "graded mesh and steps" not in contest.methods:
         kind = "graded steps"
@@ -168,14 +173,49 @@ def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[R
     for method, n, scene, _ in sorted(
         entries, key=lambda entry: entry[2].mesh.model_dump_json()
     ):  # a mesh is located once
-        run = Companion(scene)
-        distance = reference.distance(run)
-        found[method, n] = row(method, n, run, distance, reference.size, seconds(run, partial(Companion, scene)))
+        run, outcome = Companion(scene), COMPLETED
+        try:
+            distance = reference.distance(run)
+            cost = seconds(run, partial(Companion, scene))
+        except RuntimeError as why:
+            distance, cost, outcome = Distance(dict.fromkeys(QUANTITIES, NAN)), NAN, str(why)
+            say(f"{method}, n = {n}: {why}")
+        found[method, n] = row(method, n, run, distance, reference.size, cost) | {"outcome": outcome}
     own = row("reference", contest.reference, reference.run, Distance(), reference.size, reference.run.seconds)
     finest = contest.typed(kind, contest.reference, FINER)
     return [
         *(found[method, n] | {"setting": typed, "from_ours": 0.0} for method, n, _, typed in entries),
-        own | {"setting": finest, "from_ours": 0.0},
+        own | {"outcome": COMPLETED, "setting": finest, "from_ours": 0.0},
+    ]
+
+
+def front(contest: str, rows: Sequence[Row], quantity: str) -> list[Row]:
+    """The settings that err less than every cheaper one by a tenth, cheapest first, with what is typed for them.
+
+    Settings that change the model of the scene have no place in it.
+
+    `gain` compares with the cheapest equal steps that err no more; it is nan where none do.
+    """
+    own = [
+        row for row in rows if row["method"] in {*METHODS} - {*KNOBS} and row["cpu_seconds"] > 0 and row[quantity] > 0
+    ]
+    best: list[Row] = []
+    for row in sorted(own, key=lambda row: row["cpu_seconds"]):
+        if not best or row[quantity] < WORTH * best[-1][quantity]:
+            best.append(row)
+    equal = [row for row in own if row["method"] == "equal steps"]
+
+    def gain(row: Row) -> float:
+        as_good = [other["cpu_seconds"] for other in equal if other[quantity] <= row[quantity]]
+        return min(as_good) / row["cpu_seconds"] if as_good else NAN
+
+    return [
+        {"contest": contest, "quantity": quantity}
+        | {name: row[name] for name in ("method", "n", "cells", "steps")}
+        | {"error": row[quantity]}
+        | {name: row[name] for name in ("cpu_seconds", "factor_bytes", "work")}
+        | {"gain": gain(row), "setting": row["setting"]}
+        for row in best
     ]
 
 

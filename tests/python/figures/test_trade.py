@@ -10,11 +10,15 @@ import pytest
 from warmslip import figures
 from warmslip.figures.trade import ERRORS, LOOKS, ORDINARY, OTHERS
 from warmslip.records import tables
+from warmslip.studies import tradeoff
 from warmslip.studies.tradeoff import METHODS
 
 
 def row(method: str, n: int, error: float, seconds: float) -> dict[str, Any]:
-    return {"method": method, "n": n, "cpu_seconds": seconds} | dict.fromkeys(ERRORS, error)
+    cost = {"cpu_seconds": seconds, "factor_bytes": 8 * n**2, "work": n**3, "cells": n**2, "steps": n}
+    return (
+        {"method": method, "n": n, "outcome": "completed", "setting": f"run {n}"} | cost | dict.fromkeys(ERRORS, error)
+    )
 
 
 ROWS = [
@@ -41,7 +45,7 @@ def test_the_caption_has_the_gains(tmp_path: Path) -> None:
         "some case: the error 0.1 of equal steps with n = 16 (1 s) is had by adaptive steps with n = 8 in 0.2 s" in text
     )
     assert "5 times quicker" in text
-    assert "an ordinary Newton takes 40 s, 200 times as long" in text
+    assert "ordinary Newton takes 40 s, 200 times as long" in text
 
 
 @pytest.mark.parametrize("left_out", [ORDINARY, "reference, half"])
@@ -53,7 +57,30 @@ def test_curves_may_be_absent(tmp_path: Path, left_out: str) -> None:
 def test_a_caption_claims_no_gain_where_there_is_none(tmp_path: Path) -> None:
     text = " ".join(drawn(tmp_path, [one for one in ROWS if one["method"] != "adaptive steps"]).split())
     assert "with n = 16 (1 s) is had by nothing else that is quicker" in text
-    assert "an ordinary Newton takes 40 s, 40 times as long" in text
+    assert "ordinary Newton takes 40 s, 40 times as long" in text
+
+
+def test_runs_that_stop_are_said(tmp_path: Path) -> None:
+    failed = row("adaptive steps", 16, float("nan"), float("nan")) | {"outcome": "contact_not_converged in step 3"}
+    assert "No answer: adaptive steps with n = 16 (contact_not_converged in step 3)." in " ".join(
+        drawn(tmp_path, [*ROWS, failed]).split()
+    )
+
+
+def test_the_front_errs_less_than_all_that_is_cheaper() -> None:
+    worse = row("graded steps", 8, 0.06, 0.3)
+    found = tradeoff.front("some_case", [*ROWS, worse], "e_sum")
+    assert [(one["method"], one["n"]) for one in found] == [("equal steps", 8), ("adaptive steps", 8)]
+    assert found[0]["gain"] == 1.0 and found[1]["gain"] != found[1]["gain"]  # no equal steps err less than 0.05
+    assert found[1]["error"] == 0.05 and found[1]["setting"] == "run 8"
+
+
+def test_the_fronts_are_drawn(tmp_path: Path) -> None:
+    table, fronts = tmp_path / "trade_some_case.csv", tmp_path / "front.csv"
+    tables.write(table, ROWS)
+    tables.write(fronts, tradeoff.front("some_case", ROWS, "e_sum"))
+    figures.draw("front", [fronts, table], tmp_path / "front.png")
+    assert (tmp_path / "front.png").stat().st_size > 10_000
 
 
 def test_every_method_has_its_look() -> None:

@@ -19,7 +19,7 @@ from warmslip.simulation.simulation import Simulation
 from warmslip.studies.companions import Companion, Distance
 from warmslip.studies.error_norms import TERMS, ExactErrors
 from warmslip.studies.recording import seconds
-from warmslip.studies.tradeoff import KNOBS, METHODS, Keys, row
+from warmslip.studies.tradeoff import COMPLETED, KNOBS, METHODS, Keys, row
 from warmslip.verification.mms.manufactured import slipping
 from warmslip.verification.mms.symbolic import Manufactured
 
@@ -64,7 +64,8 @@ def run(levels: tuple[int, ...] = LEVELS, say: Callable[[str], None] = lambda _:
                 continue
             errors, size = distance(one, solution)
             spent = seconds(one, lambda scene=scene: companion(scene, solution))  # type: ignore[misc]
-            rows.append(row(method, n, one, errors, size, spent) | {"setting": _typed(keys), "from_ours": 0.0})
+            more = {"outcome": COMPLETED, "setting": _typed(keys), "from_ours": 0.0}
+            rows.append(row(method, n, one, errors, size, spent) | more)
     return rows
 
 
