@@ -119,12 +119,12 @@ class Tree:
         error = re.search(r"error: .*", result.stdout + result.stderr)
         return "" if result.returncode == 0 else error[0] if error else "the build failed"
 
-    def failures(self, *, every: bool, near: str = "", first: Sequence[str] = ()) -> list[str]:
+    def failures(self, *, every: bool, near: str = "", first: Sequence[str] = (), alone: bool = False) -> list[str]:
         """The tests that fail: the first, or all of them. The files in `first` and those that name the Python module `near`
-        come first, without one the native tests of the core."""
+        come first, without one the native tests of the core. No other Python tests run where those are to be `alone`."""
         found = [] if near else self._native(f"--test-case-exclude={STORED}")
         if not found or every:
-            found += self._python(near, first, every=every)
+            found += self._python(near, first, every=every, alone=alone)
         if not found or every:
             found += self._native() if near else self._native(f"--test-case={STORED}")
         return list(dict.fromkeys(found))
@@ -134,19 +134,24 @@ class Tree:
         found = [f"ctest: {name.strip()}" for name in re.findall(r"TEST CASE: (.*)", tests.stdout)]
         return found or self._crash(tests)
 
-    def _python(self, near: str, first: Sequence[str], *, every: bool) -> list[str]:
+    def _python(self, near: str, first: Sequence[str], *, every: bool, alone: bool) -> list[str]:
         # of the mathematics first
         files = [
             p
             for folder in ("core", "python", "repository")
             for p in sorted((self.at / "tests" / folder).rglob("test_*.py"))
         ]
-        files.sort(
-            key=lambda path: (
-                str(path.relative_to(self.at)) not in first,
-                not (near and re.search(rf"\b{near}\b", path.read_text())),
-            )
-        )
+
+        def rank(path: Path) -> int:
+            if str(path.relative_to(self.at)) in first:
+                return 0
+            return 1 if near and re.search(rf"\b{near}\b", path.read_text()) else 2
+
+        files.sort(key=rank)
+        if alone:
+            files = [path for path in files if rank(path) < 2]
+        if not files:
+            return []
         tests = self._run(
             *(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE"),
             *([] if every else ["-x"]),
@@ -193,7 +198,9 @@ class Tree:
             if error:
                 return Found(fault, "invalid", error)
             python = fault.file.endswith(".py")
-            failed = self.failures(every=options.every, near=path.stem if python else "", first=first)
+            failed = self.failures(
+                every=options.every, near=path.stem if python else "", first=first, alone=options.near
+            )
             if options.workflow:
                 failed += [f"workflow: {name}" for name in self.verdict()]
             return Found(fault, "killed" if failed else "survived", "; ".join(failed) or fault.survives)
@@ -210,6 +217,9 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=CORES, help="trees at work at once")
     parser.add_argument("--resume", action="store_true", help="keep what the table at --out says of other faults")
     parser.add_argument("--every", action="store_true", help="run all tests, not only up to the first that fails")
+    parser.add_argument(
+        "--near", action="store_true", help="run the native tests and those that belong to a fault alone"
+    )
     parser.add_argument("--workflow", action="store_true", help="run the small workflow as well, for its verdict")
     parser.add_argument("--trees", type=Path, help="where to keep the built trees for the next time (default: nowhere)")
     parser.add_argument("--out", type=Path, help=f"a CSV of what was found (all: {TABLE.relative_to(ROOT)})")
@@ -252,6 +262,8 @@ def main() -> int:
             progress.print(f"{fault.name}: {found.outcome}, {found.by}", markup=False, highlight=False)
             sys.stdout.flush()
             progress.advance(judging)
+            if options.near and found.outcome == "survived":
+                return found  # the other tests have not looked at it
             found = found._replace(commit=commit())
             with writing:
                 table[fault.name] = found
