@@ -90,7 +90,7 @@ void bind(py::module_& m) {
           },
           "Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may "
           "make of it, and the largest estimated change; then the largest nodal force, the displacement at the last "
-          "look at the stress, the largest velocity, and the largest displacements of contact points, by axis.")
+          "look at the stress, the largest velocity, and the largest displacements, by axis.")
       .def("part", &S::part, py::arg("strained"), py::arg("strained_w"), py::arg("rigid"),
            "After `start`: displacement and velocity of a body without supports but for rigid motions, and the "
            "velocities of those.")

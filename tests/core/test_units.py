@@ -12,6 +12,7 @@ import numpy as np
 from support.boxes import along, completed, elasticity, field, forces_of, scene
 from support.ranked import Checks
 
+from warmslip.model.meshes import make_mesh
 from warmslip.scene.reader import load
 
 check = Checks()
@@ -170,6 +171,29 @@ def a_block_that_slides_on_a_rigid_foundation(d: int) -> None:
     first = forces(1.0)
     for scale in (1 + 1e-15, 1 - 1e-14):
         assert np.abs(forces(scale) - first).max() <= 1e-6 * np.abs(first).max()
+
+
+@check
+def a_block_far_from_the_origin(d: int) -> None:
+    """Gauss points are found where rounded positions say, with the interpolation of the rule."""
+    one = scene(
+        d,
+        2,
+        inertia={"density": 1.0},
+        elasticity=elasticity(d, 1.0, 0.3),
+        loads={"body": along(d, -1e-3, 3e-4)},
+        contact={"part": "bottom", "stiffness": 100.0, "quadrature": "gauss-2", "friction": {"coefficient": 0.3}},
+    )
+    near = make_mesh(one)
+    parts = {name: np.array(facets) for name, facets in near.parts.items()}
+
+    def forces(offset: float) -> Any:
+        mesh = type(near).from_lists(np.array(near.nodes) + offset, near.cells, parts)
+        return forces_of(completed(one, mesh=mesh))
+
+    there = forces(0.0)
+    for offset in (2.0**20, 2.0**30):  # every node is there to the last bit
+        assert np.abs(forces(offset) - there).max() <= 1e-13 * np.abs(there).max()
 
 
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)

@@ -224,12 +224,12 @@ Eigen::VectorXd ContactSolver<d>::direction(const Linearisation& at) const {
 }
 
 template <int d>
-bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const {
+bool ContactSolver<d>::accept(const ContactProblem<d>& problem, ContactSolution<d>& solution, double rest) const {
   solution.law_residual = law_residual(problem, solution.force, solution.velocity);
   if (solution.law_residual <= options_.tolerance) return true;
-  if (!terms_cancel_ || !(solution.law_residual <= nearly)) return false;
-  // forces on both sides of a body that springs hardly hold: each moves it far, and together they do not
-  const Eigen::VectorXd moved = compliance_.cwiseAbs() * solution.added.cwiseAbs();
+  if (!terms_cancel_ || !(solution.law_residual <= nearly || rest <= 1e-13 * solution.force.norm())) return false;
+  // forces on both sides of a body that springs hardly hold, or in a corner: each moves it, and together they do not
+  const Eigen::VectorXd moved = compliance_.cwiseAbs() * solution.force.cwiseAbs();
   const Point<d> terms = problem.step * moved.reshaped(d, moved.size() / d).rowwise().maxCoeff();
   solution.law_residual = law_residual(problem, solution.force, solution.velocity, terms);
   return solution.law_residual <= options_.tolerance;
@@ -257,7 +257,7 @@ bool ContactSolver<d>::newton(const ContactProblem<d>& problem, bool line_search
     const bool wanted = (step == 0 || (step < patience && at.key != tried)) && problem.known_force.size() > 0 &&
                         at.value.head(all).norm() <= 1e-6 * solution.force.norm();
     tried = at.key;
-    if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution)) {
+    if (!wanted && unbalanced <= options_.tolerance * forces && accept(problem, solution, at.value.head(all).norm())) {
       solution.status.clear();
       for (const auto& point : at.points) solution.status.push_back(point.status);
       // beside large motions the law's residual says little of small forces
@@ -364,7 +364,7 @@ bool ContactSolver<d>::respond(const ContactProblem<d>& problem, const Eigen::Ve
       const ContactProblem<d>&, const Eigen::VectorXd&, const Eigen::VectorXd&) const;                                \
   template void ContactSolver<d>::factor(const ContactProblem<d>&, const Linearisation&, ContactSolution<d>&);        \
   template Eigen::VectorXd ContactSolver<d>::direction(const Linearisation&) const;                                   \
-  template bool ContactSolver<d>::accept(const ContactProblem<d>&, ContactSolution<d>&) const;                        \
+  template bool ContactSolver<d>::accept(const ContactProblem<d>&, ContactSolution<d>&, double) const;                \
   template bool ContactSolver<d>::newton(const ContactProblem<d>&, bool, ContactSolution<d>&);                        \
   template void ContactSolver<d>::polish(const ContactProblem<d>&, ContactSolution<d>&);                              \
   template bool ContactSolver<d>::respond(const ContactProblem<d>&, const Eigen::VectorXd&, const std::vector<bool>&, \

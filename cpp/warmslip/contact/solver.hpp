@@ -60,7 +60,7 @@ class ContactSolver {
   bool newton_with_spring(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   void stick_at_one_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool newton_with_lent_mass(const ContactProblem<d>& problem, ContactSolution<d>& solution);
-  bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution) const;
+  bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution, double rest = unlimited) const;
   PointCompliance diagonal_block(const ContactProblem<d>& problem, std::size_t point) const;
 
   Eigen::MatrixXd compliance_;

@@ -1,17 +1,19 @@
 // The terms of the contact in the balances, with their own interpolation to the contact points.
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
 #include "warmslip/contact/residual.hpp"
+#include "warmslip/mesh/quadrature.hpp"
 #include "warmslip/time/balances.hpp"
 
 namespace warmslip {
 
 // The hat functions of the contact nodes at the contact points, from where the points are: the facet of the point's
 // part with its normal that it lies on, and its barycentric coordinates there. Nothing of the solver's own matrix is
-// used, so that a fault in it shows. Points come in the order of the facets, hence the search goes on from the last
-// one.
+// used, so that a fault in it shows. Far from the origin positions are rounded, and the nearest point of the rule is
+// meant. Points come in the order of the facets, hence the search goes on from the last one.
 template <int d>
 void BalanceEvaluator<d>::find_shape_functions() {
   const Mesh<d>& mesh = layout_.mesh();
@@ -19,8 +21,12 @@ void BalanceEvaluator<d>::find_shape_functions() {
   for (const Index node : surface_.mesh_nodes()) column.emplace(node, static_cast<int>(column.size()));
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::Index facet = 0;
+  std::map<int, Rule> rules;
+  for (const ContactPart& contact : problem_.contacts)
+    if (const int points = contact.quadrature.points; points > 0) rules.emplace(points, simplex_rule(d - 1, points));
   for (Eigen::Index q = 0; q < surface_.points(); ++q) {
-    const Facets<d>& facets = mesh.part(problem_.contacts[surface_.contact(q)].part);
+    const ContactPart& contact = problem_.contacts[surface_.contact(q)];
+    const Facets<d>& facets = mesh.part(contact.part);
     const Point<d> x = surface_.positions().row(q).transpose(), nu = surface_.normals().row(q).transpose();
     bool found = false;
     for (Eigen::Index tried = 0; tried < facets.nodes.rows() && !found; ++tried, ++facet) {
@@ -33,11 +39,19 @@ void BalanceEvaluator<d>::find_shape_functions() {
       Eigen::Matrix<double, d, d - 1> sides;
       for (int i = 1; i < d; ++i) sides.col(i - 1) = corners.col(i) - corners.col(0);
       const Eigen::Matrix<double, d - 1, 1> b = sides.colPivHouseholderQr().solve(x - corners.col(0));
-      if (b.minCoeff() < -1e-9 || b.sum() > 1 + 1e-9 || (sides * b - (x - corners.col(0))).norm() > 1e-9 * sides.norm())
+      const double off = 1e-9 + 8 * std::numeric_limits<double>::epsilon() * corners.cwiseAbs().maxCoeff() /
+                                    sides.colwise().norm().minCoeff();
+      if (b.minCoeff() < -off || b.sum() > 1 + off || (sides * b - (x - corners.col(0))).norm() > off * sides.norm())
         continue;
       found = true;
       Point<d> weights(Point<d>::Constant(1 - b.sum()));
       weights.template tail<d - 1>() = b;
+      if (contact.quadrature.points > 0) {
+        const auto& points = rules.at(contact.quadrature.points).barycentric;
+        Eigen::Index nearest;
+        if ((points.rowwise() - weights.transpose()).rowwise().norm().minCoeff(&nearest) <= 4 * off)
+          weights = points.row(nearest).transpose();
+      }
       if (weights.maxCoeff() > 1 - 1e-9) {  // at a corner: rounding of the others would carry large forces to them
         Eigen::Index corner;
         weights.maxCoeff(&corner);

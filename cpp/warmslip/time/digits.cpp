@@ -234,8 +234,7 @@ void Stepper<d>::note_sizes(const ContactSolution<d>& contact) {
   }
   if (!systems_->contact || contact.force.size() == 0) return;
   grow(extents_.contact_force, contact.force.template lpNorm<Eigen::Infinity>());
-  const auto motions = next_.contact_u.reshaped(d, surface_.points()).cwiseAbs().rowwise().maxCoeff();
-  extents_.motion.head(d) = extents_.motion.head(d).cwiseMax(motions);
+  extents_.motion = extents_.motion.cwiseMax(next_.reach);
 }
 
 template class Stepper<2>;

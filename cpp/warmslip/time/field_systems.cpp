@@ -39,6 +39,7 @@ void Stepper<d>::products(TimeLevel& level) const {
                                 largest_here(level.theta)};
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
   level.sizes = {largest[0], largest[1], level.strained_w ? largest[2] : largest[1], largest[3]};
+  if (level.u) WARMSLIP_PETSC(VecStrideNormAll(level.u, NORM_INFINITY, level.reach.data()));
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
 }
 

@@ -65,7 +65,7 @@ struct FieldExtents {
   double force = 0;                                  ///< the largest nodal force so far
   double speed = 0;                                  ///< the largest velocity so far
   double looked = 0;                                 ///< the size of u when the stress was looked at last
-  Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< the largest displacement of a contact point so far, by axis
+  Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< the largest displacement so far, by axis
 
   std::array<Extent*, 4> all() { return {&u, &theta, &stress, &contact_force}; }
 };

@@ -17,7 +17,8 @@ struct TimeLevel {
 
   struct {
     double u = 0, w = 0, straining = 0, theta = 0;
-  } sizes;  ///< largest entries, of u the part that inner forces see
+  } sizes;                                          ///< largest entries, of u the part that inner forces see
+  Eigen::Vector3d reach = Eigen::Vector3d::Zero();  ///< largest entries of u, by axis
 
   /// The displacement and the velocity that inner forces see.
   Vec shape() const { return strained ? strained : u; }
@@ -59,7 +60,7 @@ struct StepInputs {
   Eigen::VectorXd foundation;         ///< theta_F at the points, where the conductance depends on the pressure
   Eigen::VectorXd drive;              ///< tangential velocity of the foundation, to which slip is relative, (d points)
   Vec support_velocity;               ///< of the held directions, null where all are at rest
-  /// Of the contact points, by axis: a displacement that the rounding of earlier ones may make.
+  /// By axis: a displacement that the rounding of those of the body may make.
   Eigen::Vector3d least_motion = Eigen::Vector3d::Zero();
 };
 
