@@ -122,8 +122,9 @@ class Forms:
         self.scene, self.mesh = scene, mesh
         self.moves, self.conducts = scene.moves, heat is not None
         self.inertia = zeros(d * N, d * N) if scene.inertia and scene.inertia.density > 0 else None
-        self.elasticity = zeros(d * N, d * N) if scene.elasticity else None
-        self.viscosity = zeros(d * N, d * N) if scene.viscosity else None
+        springs = scene.supports.springs
+        self.elasticity = zeros(d * N, d * N) if scene.elasticity or springs else None
+        self.viscosity = zeros(d * N, d * N) if scene.viscosity or springs else None
         self.storage, self.conduction, self.exchange = (zeros(N, N) for _ in range(3))
         self.expansion = zeros(d * N, N) if heat and heat.expansion else None
         self.heating = zeros(N, d * N) if heat and heat.heating else None
@@ -131,11 +132,31 @@ class Forms:
         self.volumes: list[Any] = []
         for cell in mesh.cells:
             self._cell(cell)
+        for part in springs:
+            self._springs(part)
         for contact in scene.contacts:
             k_c = contact.heat_exchange.conductance if contact.heat_exchange else 0.0
             for facet in mesh.parts[contact.part] if k_c else ():
                 _, size = mesh.facet(facet)
                 self.exchange[np.ix_(facet, facet)] += self._products(len(facet), size * big(k_c))
+
+    def _springs(self, part: str) -> None:
+        """Adds those of a part to elasticity, and its dashpots to viscosity."""
+        d, springs = self.mesh.d, self.scene.supports.springs[part]
+        for axes, normal, into in (
+            (springs.stiffness, springs.normal_stiffness, self.elasticity),
+            (springs.damping, springs.normal_damping, self.viscosity),
+        ):
+            assert into is not None
+            each = big(axes if isinstance(axes, list) else [axes] * d)
+            for facet in self.mesh.parts[part]:
+                nu, size = self.mesh.facet(facet)
+                block = big(normal) * np.outer(nu, nu)
+                block[np.arange(d), np.arange(d)] += each
+                products = self._products(len(facet), size)
+                for i, a in enumerate(facet):
+                    for j, b in enumerate(facet):
+                        into[d * a : d * (a + 1), d * b : d * (b + 1)] += products[i, j] * block
 
     @staticmethod
     def _products(corners: int, measure: Any) -> Big:
@@ -160,7 +181,7 @@ class Forms:
         both = np.ix_(dofs, dofs)
         B = matrix(strain)
         for table, into in ((scene.elasticity, self.elasticity), (scene.viscosity, self.viscosity)):
-            if into is not None:
+            if table is not None and into is not None:
                 into[both] += volume * entries(B.transpose() * matrix(isotropic(table, d)) * B)
         if self.inertia is not None:
             block = self._products(d + 1, volume * big(scene.inertia.density))  # type: ignore[union-attr]

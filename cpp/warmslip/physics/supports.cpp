@@ -14,7 +14,7 @@ std::map<Index, Tensor2<d>> held_directions(const Problem<d>& problem) {
 }
 
 template <int d>
-ResistedDirections<d> resisted_directions(const Problem<d>& problem) {
+ResistedDirections<d> resisted_directions(const Problem<d>& problem, bool on_springs) {
   ResistedDirections<d> out;
   const auto add = [&](Index node, const Tensor2<d>& directions) {
     for (int a = 0; a < d; ++a)
@@ -24,6 +24,7 @@ ResistedDirections<d> resisted_directions(const Problem<d>& problem) {
       }
   };
   for (const auto& [node, directions] : held_directions(problem)) add(node, directions);
+  if (!on_springs) return out;
   for (const PartSprings<d>& springs : problem.springs) {
     const Facets<d>& facets = problem.mesh->part(springs.part);
     for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
@@ -38,7 +39,7 @@ ResistedDirections<d> resisted_directions(const Problem<d>& problem) {
 
 template std::map<Index, Tensor2<2>> held_directions(const Problem<2>&);
 template std::map<Index, Tensor2<3>> held_directions(const Problem<3>&);
-template ResistedDirections<2> resisted_directions(const Problem<2>&);
-template ResistedDirections<3> resisted_directions(const Problem<3>&);
+template ResistedDirections<2> resisted_directions(const Problem<2>&, bool);
+template ResistedDirections<3> resisted_directions(const Problem<3>&, bool);
 
 }  // namespace warmslip

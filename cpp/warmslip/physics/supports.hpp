@@ -38,14 +38,14 @@ struct PartSprings {
 template <int d>
 std::map<Index, Tensor2<d>> held_directions(const Problem<d>& problem);
 
-/// One row for every node of a held node or of a facet on springs, (rows, d), and the nodes of the rows: a rigid motion
-/// is resisted unless all products of these rows with its nodal values vanish.
+/// One row for every held node and, `on_springs`, for every node of a facet on springs or dashpots, (rows, d), and the
+/// nodes of the rows: a rigid motion is resisted unless all products of these rows with its nodal values vanish.
 template <int d>
 struct ResistedDirections {
   std::vector<Index> nodes;
   std::vector<Point<d>> rows;
 };
 template <int d>
-ResistedDirections<d> resisted_directions(const Problem<d>& problem);
+ResistedDirections<d> resisted_directions(const Problem<d>& problem, bool on_springs);
 
 }  // namespace warmslip

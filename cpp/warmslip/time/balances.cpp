@@ -39,6 +39,7 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   if (problem.moves()) reactions_ = layout.vector(d);
   if (operators.springs) springs_ = layout.vector(d);
   if (operators.dashpots) dashpots_ = layout.vector(d);
+  if (operators.dashpots) rigid_w_ = layout.vector(d);
   if (operators.conductivity) conducted_ = layout.vector(1);
   if (operators.conductivity) support_heat_ = layout.vector(1);
   if (operators.exchange) exchanged_ = layout.vector(1);
@@ -86,8 +87,12 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
 template <int d>
 Balances BalanceEvaluator<d>::evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& in) {
   if (after.w) multiply(operators_.viscosity, after.straining(), viscous_w_);
-  if (springs_) multiply(operators_.springs, after.shape(), springs_);
-  if (dashpots_) multiply(operators_.dashpots, after.straining(), dashpots_);
+  if (springs_) multiply(operators_.springs, sprung_ ? Vec(after.u) : after.shape(), springs_);
+  if (dashpots_) multiply(operators_.dashpots, sprung_ ? Vec(after.w) : after.straining(), dashpots_);
+  if (dashpots_ && sprung_) {
+    WARMSLIP_PETSC(VecWAXPY(rigid_w_, -1, after.strained_w, after.w));
+    WARMSLIP_PETSC(MatMultAdd(operators_.dashpots, rigid_w_, viscous_w_, viscous_w_));
+  }
   multiply(operators_.conductivity, after.theta, conducted_);
   multiply(operators_.exchange, after.theta, exchanged_);
   return terms(before, after, in);

@@ -21,7 +21,7 @@ class BalanceEvaluator {
 
   /// Takes from the system of a step how much of the inner forces' rounding reaches the force and the moment of the
   /// body: all, but along those of its rigid motions that are solved for apart (collective).
-  void take_shares(const RigidMotions& rigid);
+  void take_shares(const RigidMotions& rigid, bool sprung);
 
   /// The balances of the step from `before` to `after` (collective).
   Balances evaluate(const TimeLevel& before, const TimeLevel& after, const StepInputs& inputs);
@@ -65,6 +65,7 @@ class BalanceEvaluator {
   const ContactSurface<d>& surface_;
   VecHandle viscous_w_, contact_force_, reactions_;     // B w, E lambda
   VecHandle springs_, dashpots_;                        // S u, S w of springs and dashpots
+  VecHandle rigid_w_;                                   // w but for what strains, where dashpots resist it
   VecHandle conducted_, exchanged_, support_heat_;      // D theta, J theta
   VecHandle contact_heat_, contact_heat_size_;          // heat that leaves at the contact points, and its magnitudes
   Eigen::MatrixX2d contact_heat_flow_;                  // of the points, conducted and made by friction
@@ -85,6 +86,7 @@ class BalanceEvaluator {
   std::vector<int> support_;                  // of a node in held_, -1 where it is free
   std::vector<Tensor2<d>> held_;              // projectors onto the directions in which the displacement is given
   using Resultants = Eigen::Vector<double, d*(d + 1) / 2>;  // along the axes, then about them
+  bool sprung_ = false;                                     // whether springs resist the rigid motions
   Resultants shares_ = Resultants::Ones();                  // of the inner forces' rounding, see take_shares
   bool stores_magnitudes_ = false;             // whether the step that is being closed notes its magnitudes
   double stiffest_ = 0;                        // largest row of the elasticity

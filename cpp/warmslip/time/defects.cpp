@@ -32,7 +32,11 @@ void BalanceEvaluator<d>::momentum_defect(const TimeLevel& before, const TimeLev
     Values values(out), m1(after.momentum), m0(before.momentum);
     *values -= (*m1 - *m0) / in.k;
   }
-  if (external) WARMSLIP_PETSC(VecCopy(out, external));
+  if (external) {
+    WARMSLIP_PETSC(VecCopy(out, external));
+    if (sprung_) add(external, -1, springs_);
+    if (sprung_) add(external, -1, dashpots_);
+  }
   add(out, 1, in.expansion_theta);
   add(out, -1, viscous_w_);
   add(out, -1, after.elastic_u);

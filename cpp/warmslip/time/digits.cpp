@@ -88,12 +88,12 @@ void Stepper<d>::add_motion_of_error(const ContactSolution<d>& contact) {
   extents_.u.tried += largest_entry(change_u);
 }
 
-// Adds what a body without supports drifts: the rounding of constant loads is the same in every step, and moves it by
-// half the square of their number. Contact that leaves a part r of a motion in every step leaves r / (1 - r) of all. In
-// a step that touches after one that did not, the drift before is over.
+// Adds what a body without supports and springs drifts: the rounding of constant loads is the same in every step, and
+// moves it by half the square of their number. Contact that leaves a part r of a motion in every step leaves r / (1 -
+// r) of all. In a step that touches after one that did not, the drift before is over.
 template <int d>
 void Stepper<d>::add_drift(const Eigen::VectorXd& motions, bool lands) {
-  if (motions.size() == 0 || !operators_.inertia) return;
+  if (motions.size() == 0 || !operators_.inertia || systems_->sprung) return;
   const double all = 0.5 * (taken_ + 1.0) * (taken_ + 1.0);
   Eigen::VectorXd drifts =
       systems_->rigid.alone(systems_->rigid.apart() ? rigid_load_ : systems_->rigid.of(momentum_external_));

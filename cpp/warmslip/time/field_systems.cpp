@@ -28,6 +28,11 @@ template <int d>
 void Stepper<d>::products(TimeLevel& level) const {
   multiply(operators_.inertia, level.w, level.momentum);
   if (level.elastic_u) multiply(operators_.elasticity, level.shape(), level.elastic_u);
+  if (level.sprung) {  // the rigid motion strains springs alone
+    WARMSLIP_PETSC(VecWAXPY(beside_shape_, -1, level.strained, level.u));
+    WARMSLIP_PETSC(MatMultAdd(operators_.springs, beside_shape_, level.elastic_u, level.elastic_u));
+    WARMSLIP_PETSC(MatMult(operators_.springs, level.u, level.sprung));
+  }
   multiply(operators_.mass, level.theta, level.mass_theta);
   if (level.expansion_theta) {
     const double from = operators_.common_reference;
@@ -68,7 +73,21 @@ void Stepper<d>::momentum_right_side(const StepLoads& loads, const Eigen::Vector
   }
   const auto less = [&](Mat a, double factor, Vec x) { subtract(a, factor, x, correction_w_, out); };
   if (loads.support_velocity) less(operators_.inertia, 1 / k, loads.support_velocity);
+  if (systems_->sprung && !from.isZero(0)) {  // what is seen from a motion has springs that it strains
+    const Vec seen = next_.strained_w;
+    WARMSLIP_PETSC(VecSet(seen, 0));
+    systems_->rigid.carry(from, seen);
+    less(operators_.springs, k, seen);
+    less(operators_.dashpots, 1, seen);
+  }
   if (momentum_external_) WARMSLIP_PETSC(VecCopy(out, momentum_external_));
+  if (systems_->sprung) {
+    if (now_.sprung) WARMSLIP_PETSC(VecAXPY(momentum_external_, -1, now_.sprung));
+    if (loads.support_velocity) {
+      subtract(operators_.springs, k, loads.support_velocity, correction_w_, momentum_external_);
+      subtract(operators_.dashpots, 1, loads.support_velocity, correction_w_, momentum_external_);
+    }
+  }
   if (now_.elastic_u) WARMSLIP_PETSC(VecAXPY(out, -1, now_.elastic_u));
   if (!monolithic() && now_.expansion_theta) WARMSLIP_PETSC(VecAXPY(out, 1, now_.expansion_theta));
   if (loads.support_velocity) {

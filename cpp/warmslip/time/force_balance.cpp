@@ -41,8 +41,9 @@ Point<d> motion_of(Eigen::Index resultant, const Point<d>& x) {
 }  // namespace
 
 template <int d>
-void BalanceEvaluator<d>::take_shares(const RigidMotions& rigid) {
+void BalanceEvaluator<d>::take_shares(const RigidMotions& rigid, bool sprung) {
   shares_.setOnes();
+  sprung_ = sprung;
   if (!rigid.apart()) return;
   const VecHandle motion = layout_.vector(d);
   for (Eigen::Index resultant = 0; resultant < shares_.size(); ++resultant) {
@@ -67,7 +68,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   std::array<double, 6> largest{};
   const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
-               w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta;
+               w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta,
+               reach = std::max(after.reach.maxCoeff(), before.reach.maxCoeff());
   const bool warm =
       std::max(theta, std::abs(operators_.common_reference)) > temperature_of_rounding(before, after, in.k);
   {
@@ -92,18 +94,20 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
                    expands = std::max(size(expansion), std::abs(operators_.common_reference) * row(expansion_rows_)),
                    stretches = std::max(size(elastic), size(viscous)),
                    moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
-                   within = u * row(elastic_rows_) + w * row(viscous_rows_),
-                   magnitude = moved + given + within + theta * row(expansion_rows_);
+                   sprung = reach * row(spring_rows_) + after.sizes.w * row(dashpot_rows_),
+                   beside = sprung_ ? sprung : 0,  // springs resist more than what strains
+          within = u * row(elastic_rows_) + w * row(viscous_rows_),
+                   magnitude = moved + given + within + beside + theta * row(expansion_rows_);
       const int support = support_[static_cast<std::size_t>(i)];
       const Tensor2<d>* held = support >= 0 ? &held_[static_cast<std::size_t>(support)] : nullptr;
       const bool fixed = held && held->isIdentity(0);
       // a force in one direction has no rounding in another, in which the body may be free to move
       const Point<d> outer =
-          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved);
+          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved + beside);
       if (stores_magnitudes_) force_external_.template segment<d>(i * d) = outer;
       if (stores_magnitudes_)
         force_magnitudes_.template segment<d>(i * d) =
-            fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given));
+            fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given - beside));
       if (held) {
         const Point<d> reaction = *held * left;
         const double missed = size(*held * (way - at(*supported)));  // what supports prescribe
@@ -113,7 +117,6 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
         (*reactions).template segment<d>(i * d) = reaction;
       } else {
         // inner forces cancel in the sum over a body; those of springs along a normal are sums of larger terms
-        const double sprung = springs_ || dashpots_ ? u * row(spring_rows_) + w * row(dashpot_rows_) : 0;
         force.add(position, external + springy, moved + given + sprung, magnitude - moved - given, shares_);
       }
       if (!fixed) {

@@ -70,11 +70,29 @@ RigidMotions::Resisted nodes_of(const Problem<d>& problem, const std::vector<std
   return out;
 }
 
-// What supports and springs resist.
+// What supports resist, and springs.
 template <int d>
-RigidMotions::Resisted resisted(const Problem<d>& problem) {
-  const ResistedDirections<d> directions = resisted_directions(problem);
+RigidMotions::Resisted resisted(const Problem<d>& problem, bool on_springs) {
+  const ResistedDirections<d> directions = resisted_directions(problem, on_springs);
   return {directions.nodes, {directions.rows.begin(), directions.rows.end()}};
+}
+
+// Whether springs or dashpots hold some node about as well as the body around it does.
+template <int d>
+bool springs_hold(const Operators<d>& operators, double k, int width, Mat a) {
+  const VecHandle diagonal = diagonal_of(a);
+  Values entries(diagonal);
+  const Eigen::Index nodes = (*entries).size() / width;
+  int holds = 0;
+  for (const auto& [part, size] : {std::pair{Mat(operators.springs), k}, std::pair{Mat(operators.dashpots), 1.0}}) {
+    if (!part) continue;
+    const VecHandle own = diagonal_of(part);
+    Values held(own);
+    if ((size * (*held).reshaped(d, nodes).array() > 0.3 * (*entries).reshaped(width, nodes).topRows(d).array()).any())
+      holds = 1;
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &holds, 1, MPI_INT, MPI_LOR, PetscObjectComm(reinterpret_cast<PetscObject>(a)));
+  return holds != 0;
 }
 
 }  // namespace
@@ -143,17 +161,26 @@ template <int d>
 void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                                    const ContactSurface<d>& surface, Mat a, int width, Symmetry symmetry,
                                    const std::string& name, Backend backend) {
-  if (operators.elasticity || operators.viscosity)
-    rigid =
-        RigidMotions(layout, d, width, resisted(problem), parts_in_contact(problem, true),
-                     at_nodes(problem, [&](const Material<d>& m) {
-                       return (m.elasticity ? k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
-                     }));
-  if (!rigid.empty() && !problem.inertial() && surface.points() == 0)
+  if (problem.has(&Material<d>::elasticity) || problem.has(&Material<d>::viscosity)) {
+    const Eigen::VectorXd firmness = at_nodes(problem, [&](const Material<d>& m) {
+      return (m.elasticity ? k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
+    });
+    const auto left_by = [&](bool springs) {
+      return RigidMotions(layout, d, width, resisted(problem, springs), parts_in_contact(problem, true), firmness);
+    };
+    rigid = left_by(true);
+    // springs that leave no motion hold them like a mass
+    if (!problem.springs.empty() && rigid.empty()) {
+      rigid = left_by(false);
+      sprung = !rigid.empty();
+    }
+  }
+  if (!rigid.empty() && !sprung && !problem.inertial() && surface.points() == 0)
     throw std::invalid_argument(
         "nothing holds the body: its supports leave it, or a part of it, a rigid motion, and it has no inertia and no "
         "contact; hold one more place or component, or give inertia.density > 0");
-  const bool apart = !rigid.empty() && !mass_holds(operators.inertia, k, width, a);
+  const bool apart = !rigid.empty() && !mass_holds(operators.inertia, k, width, a) &&
+                     !(sprung && springs_hold<d>(operators, k, width, a));
   if (apart) rigid.add_springs(a);
   support_scales = warmslip::support_scales(layout, operators.inclined, a, width);
   momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
@@ -161,6 +188,7 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
   const auto mass = [&](Vec x, Vec y) {
     multiply(operators.inertia, x, y);
     WARMSLIP_PETSC(VecScale(y, 1 / k));
+    if (sprung) add_springs(operators, k, x, y);
     release(layout, operators.prescribed_displacement, operators.inclined, y);  // a turn about a held node
   };
   if (!apart) {
@@ -169,6 +197,16 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
   }
   rigid.prepare(*momentum, mass);
   if (symmetry == Symmetry::definite_or_refused && !rigid.holds()) throw std::invalid_argument(indefinite_coupling);
+}
+
+template <int d>
+void StepSystems<d>::add_springs(const Operators<d>& operators, double k, Vec x, Vec y) {
+  const VecHandle force = duplicate(y);
+  for (const auto& [part, size] : {std::pair{Mat(operators.springs), k}, std::pair{Mat(operators.dashpots), 1.0}}) {
+    if (!part) continue;
+    WARMSLIP_PETSC(MatMult(part, x, force));
+    WARMSLIP_PETSC(VecAXPY(y, size, force));
+  }
 }
 
 template <int d>

@@ -25,8 +25,12 @@ struct StepSystems {
   Eigen::VectorXd support_scales;          ///< of the inclined nodes in the operator of the motion
   std::unique_ptr<Factor> momentum, heat;  ///< null where absent; monolithic: `momentum` holds both fields
   RigidMotions rigid, constants;           ///< of motion and of heat, where nothing is prescribed
+  bool sprung = false;                     ///< whether springs or dashpots resist the rigid motions
   std::unique_ptr<ContactSolver<d>> contact;
   Eigen::MatrixXd carried;  ///< velocities of the contact points in the rigid motions
+
+  /// y += (k S + D) x with springs S and dashpots D.
+  static void add_springs(const Operators<d>& operators, double k, Vec x, Vec y);
 
   int factorizations() const { return (momentum ? 1 : 0) + (heat ? 1 : 0); }
   int substitutions() const;

@@ -76,7 +76,7 @@ void Stepper<d>::set_step(double k) {
     cache_->keep(systems_);
     cost_.factorizations += systems_->factorizations();
   }
-  evaluator_.take_shares(systems_->rigid);
+  evaluator_.take_shares(systems_->rigid, systems_->sprung);
   if (!systems_->constants.empty() && !heat_external_) heat_external_ = layout_.vector(1);
   cost_.factor_bytes = cache_->bytes();
 }
@@ -103,6 +103,7 @@ void Stepper<d>::take_vectors() {
     if (operators_.elasticity) level->elastic_u = layout_.vector(d);
     if (!systems_->rigid.empty())
       for (VecHandle* v : {&level->strained, &level->strained_w}) *v = layout_.vector(d);
+    if (systems_->sprung && operators_.springs) level->sprung = layout_.vector(d);
     level->rigid = Eigen::VectorXd::Zero(systems_->rigid.count());
     if (operators_.expansion && moves) level->expansion_theta = layout_.vector(d);
     if (operators_.heating && moves) level->heating_w = layout_.vector(1);
@@ -114,6 +115,7 @@ void Stepper<d>::take_vectors() {
     for (VecHandle* v : {&heat_right_, &correction_theta_}) *v = layout_.vector(1);
   if (!systems_->rigid.empty())
     for (VecHandle* v : {&momentum_external_, &correction_strained_}) *v = layout_.vector(d);
+  if (systems_->sprung) beside_shape_ = layout_.vector(d);
   if (!systems_->constants.empty()) heat_external_ = layout_.vector(1);
   if (operators_.common_reference != 0) warmer_ = layout_.vector(1);
   if (moves && conducts && options_.coupling == Coupling::monolithic)

@@ -252,6 +252,7 @@ class Stepper {
   TimeLevel now_, next_;
   VecHandle momentum_right_, heat_right_, coupled_right_, coupled_, correction_w_, correction_theta_;
   VecHandle correction_strained_;                // the correction but for a rigid motion
+  VecHandle beside_shape_;                       // u but for what strains, of a body that springs hold
   Eigen::VectorXd correction_force_;             // of the contact points
   VecHandle momentum_external_, heat_external_;  // right-hand sides without inner forces, for motions solved for apart
   VecHandle warmer_;                             // the temperature less that of reference

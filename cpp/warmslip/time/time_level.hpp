@@ -11,6 +11,7 @@ struct TimeLevel {
   VecHandle strained, strained_w;             ///< u and w but for rigid motions, where the body has no support
   Eigen::VectorXd rigid;                      ///< and the velocities of the rigid motion that w has besides
   VecHandle momentum, elastic_u, mass_theta;  ///< rho M w, A u, M theta
+  VecHandle sprung;                           ///< S u of springs that resist a rigid motion
   VecHandle expansion_theta, heating_w;       ///< G theta, E w
   Eigen::VectorXd contact_u, gap;             ///< u at the contact points (d points), g (points)
   Eigen::VectorXd contact_force;              ///< lambda of the step that ends here (d points)
