@@ -274,6 +274,21 @@ def a_body_one_cell_thick_falls_between_guides(d: int) -> None:
 
 
 @check
+def a_component_at_rest_has_no_velocity_at_the_start(d: int) -> None:
+    """Whether another component of its support is a formula or a number."""
+    ends = []
+    for last in (0.0, "0 * t"):
+        one = pressed(
+            d,
+            {"top": along(d, last, 0.0)},
+            inertia={"density": 1.0},
+            initial={"velocity": along(d, 0.0, 1e-3)},
+        )
+        ends.append(field(completed(one), "u"))
+    assert np.abs(ends[1] - ends[0]).max() <= 1e-13 * np.abs(ends[0]).max()
+
+
+@check
 def what_supports_leave_free_is_seen(d: int) -> None:
     """A body without inertia that its rollers let slide is refused; with inertia it slides."""
     sliding = pressed(d, {"bottom": along(d, 0.0, "free") if d == 2 else ["free", "free", 0.0]})

@@ -17,7 +17,14 @@ from warmslip.io.trajectory import Trajectory
 FOLDER = TESTS / "campaign/scenes"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 # judged by the digits that the run states; all others to 1e-6
-STATED = {"setting_off", "slender_and_incompressible", "soft_and_warm", "thin_and_sliding", "thin_and_soft"}
+STATED = {
+    "near_its_reference_temperature",
+    "setting_off",
+    "slender_and_incompressible",
+    "soft_and_warm",
+    "thin_and_sliding",
+    "thin_and_soft",
+}
 RANKS = ["free_warm", "gauss_2_moving_support", "regularised_steep", "slender", "solid_gauss", "waves_on_the_way_solid"]
 
 

@@ -122,7 +122,7 @@ class Forms:
         self.scene, self.mesh = scene, mesh
         self.moves, self.conducts = scene.moves, heat is not None
         self.inertia = zeros(d * N, d * N) if scene.inertia and scene.inertia.density > 0 else None
-        springs = scene.supports.springs
+        springs = scene.supports.springs or {}
         self.elasticity = zeros(d * N, d * N) if scene.elasticity or springs else None
         self.viscosity = zeros(d * N, d * N) if scene.viscosity or springs else None
         self.storage, self.conduction, self.exchange = (zeros(N, N) for _ in range(3))
@@ -142,7 +142,7 @@ class Forms:
 
     def _springs(self, part: str) -> None:
         """Adds those of a part to elasticity, and its dashpots to viscosity."""
-        d, springs = self.mesh.d, self.scene.supports.springs[part]
+        d, springs = self.mesh.d, (self.scene.supports.springs or {})[part]
         for axes, normal, into in (
             (springs.stiffness, springs.normal_stiffness, self.elasticity),
             (springs.damping, springs.normal_damping, self.viscosity),
@@ -252,7 +252,8 @@ class Forms:
                     out[i] += tensor @ (strain @ field[dofs])
             if expansion is not None:
                 full = square(expansion.tensor, d)
-                out[i] -= sum(theta[cell], ZERO) / (d + 1) * np.array([full[a, b] for a, b in VOIGT[d]])
+                warmer = sum(theta[cell], ZERO) / (d + 1) - big(expansion.reference_temperature or 0.0)
+                out[i] -= warmer * np.array([full[a, b] for a, b in VOIGT[d]])
         return mid(out)
 
 

@@ -162,8 +162,11 @@ class Scheme:
             force = force + times(matrix(f.inertia), w) / self.k
         if f.elasticity is not None:
             force = force - times(matrix(f.elasticity), u)
-        if f.expansion is not None and not self.monolithic:
-            force = force + times(matrix(f.expansion), theta)
+        if f.expansion is not None:
+            assert self.scene.heat is not None and self.scene.heat.expansion is not None
+            reference = zeros(self.N) + big(self.scene.heat.expansion.reference_temperature or 0.0)
+            warmer = -reference if self.monolithic else theta - reference
+            force = force + times(matrix(f.expansion), warmer)
         return mid(force), mid(source + times(matrix(f.storage), theta) / self.k)
 
     def reduced(self, old: State, n: int) -> tuple[Contact, Big, Big]:

@@ -164,8 +164,9 @@ double Norms<d>::v(Vec v) const {
 }
 
 template <int d>
-StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w) {
-  const Eigen::VectorXd local_u = u ? layout.local(u) : Eigen::VectorXd(), local_w = w ? layout.local(w) : local_u;
+StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w, Vec theta) {
+  const Eigen::VectorXd local_u = u ? layout.local(u) : Eigen::VectorXd(), local_w = w ? layout.local(w) : local_u,
+                        local_theta = theta ? layout.local(theta) : Eigen::VectorXd();
   const auto size = [](const Eigen::VectorXd& v) { return v.size() ? v.cwiseAbs().maxCoeff() : 0.0; };
   const double size_u = size(local_u), size_w = w ? size(local_w) : 0;
   double found[] = {0, 0};
@@ -188,15 +189,20 @@ StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u
     add(material.elasticity, u, local_u, size_u);
     add(material.viscosity, w, local_w, size_w);
     found[0] = std::max(found[0], stress.norm());
+    if (theta && material.expansion) {
+      double warmer = 0;
+      for (int i = 0; i <= d; ++i) warmer += (local_theta[layout.local_cells()(c, i)] - material.reference) / (d + 1);
+      found[0] = std::max(found[0], (from_mandel<d>(stress) - warmer * *material.expansion).norm());
+    }
     found[1] = std::max(found[1], possible);
   }
   MPI_Allreduce(MPI_IN_PLACE, found, 2, MPI_DOUBLE, MPI_MAX, layout.comm());
   return {found[0], found[1]};
 }
 
-#define WARMSLIP_INSTANTIATE(d)                                                          \
-  template StressSize stress_size<d>(const Layout<d>&, const Problem<d>&, Vec u, Vec w); \
-  template class LoadQuadrature<d>;                                                      \
+#define WARMSLIP_INSTANTIATE(d)                                                           \
+  template StressSize stress_size<d>(const Layout<d>&, const Problem<d>&, Vec, Vec, Vec); \
+  template class LoadQuadrature<d>;                                                       \
   template class Norms<d>;
 WARMSLIP_INSTANTIATE(2)
 WARMSLIP_INSTANTIATE(3)

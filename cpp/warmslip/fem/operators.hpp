@@ -101,12 +101,12 @@ class Norms {
   std::vector<Simplex<d>> cells_;
 };
 
-/// The largest |A eps(u) + B eps(w)| of a cell (Frobenius norm) for given u and w, null where there is none, and the
-/// largest that fields of these sizes could have (collective).
+/// The largest |A eps(u) + B eps(w)| of a cell (Frobenius norm), with and without -M (theta - reference), for given
+/// fields, null where there is none, and the largest that u and w of these sizes could have (collective).
 struct StressSize {
   double largest = 0, possible = 0;
 };
 template <int d>
-StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w);
+StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u, Vec w, Vec theta = nullptr);
 
 }  // namespace warmslip

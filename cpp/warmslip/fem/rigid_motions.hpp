@@ -13,6 +13,8 @@
 // of large numbers. This is the deflation of floating subdomains of FETI (Farhat & Roux, Int. J. Numer. Meth. Engng 32,
 // 1991), with the mass kept.
 //
+// Springs on parts of the body that alone hold these motions belong to M', as does their force so far to b_ext.
+//
 // The coupled operator of displacement and temperature has the same inner part in this sense: thermal stresses do no
 // work in a rigid motion, and a rigid motion makes no heat. Where the operator is not symmetric, V and W_c of the
 // second equation belong to its transpose. K is positive definite if and only if K~ and H are, because

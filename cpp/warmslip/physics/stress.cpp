@@ -24,12 +24,12 @@ void at_centroids(const Problem<d>& problem, const RealTable<d>& u, const RealTa
     const StrainMatrix<d> b = strain_matrix<d>(simplex<d>(vertices(mesh, c)));
     using Nodal = Eigen::Matrix<double, d*(d + 1), 1>;
     Nodal u_cell = Nodal::Zero(), w_cell = Nodal::Zero();
-    double mean = expands ? -material.reference : 0;
+    double mean = 0;
     for (int i = 0; i <= d; ++i) {
       const Index node = mesh.cells(c, i);
       if (elastic) u_cell.template segment<d>(i * d) = u.row(node).transpose();
       if (viscous) w_cell.template segment<d>(i * d) = w.row(node).transpose();
-      if (expands) mean += theta[node] / (d + 1);
+      if (expands) mean += (theta[node] - material.reference) / (d + 1);
     }
     visit(c, material, Mandel<d>(b * u_cell), Mandel<d>(b * w_cell), mean);
   }

@@ -88,6 +88,17 @@ void Stepper<d>::add_motion_of_error(const ContactSolution<d>& contact) {
   extents_.u.tried += largest_entry(change_u);
 }
 
+// Adds the thermal stress of the estimated error of the temperature, and of the rounding of its digits: a body near its
+// reference temperature in kelvin has few of the difference.
+template <int d>
+void Stepper<d>::add_stress_of_temperature() {
+  double expansion = 0;
+  for (const Material<d>& material : problem_.materials)
+    if (material.expansion) expansion = std::max(expansion, material.expansion->norm());
+  extents_.stress.tried +=
+      expansion * (extents_.theta.tried + 0.5 * std::numeric_limits<double>::epsilon() * next_.sizes.theta);
+}
+
 // Adds what a body without supports and springs drifts: the rounding of constant loads is the same in every step, and
 // moves it by half the square of their number. Contact that leaves a part r of a motion in every step leaves r / (1 -
 // r) of all. In a step that touches after one that did not, the drift before is over.
@@ -185,6 +196,7 @@ void Stepper<d>::estimate(const StepLoads& loads, const Balances& balances, Cont
       if (strains) multiply(operators_.expansion, correction_theta_, momentum_right_);
       if (systems_->heat) add_heat_of_error(loads);
       if (strains) add_motion_of_error(contact);
+      if (operators_.expansion) add_stress_of_temperature();
     }
     for (std::size_t i = 0; i < fields.size(); ++i) worst[i] = std::max(worst[i], fields[i]->tried);
     if (sample == 0 || undetermined_) likely = errors_;
@@ -230,7 +242,7 @@ void Stepper<d>::note_sizes(const ContactSolution<d>& contact) {
   extents_.speed = std::max(extents_.speed, next_.sizes.straining);
   if (next_.elastic_u && next_.sizes.u > 2 * extents_.looked) {
     extents_.looked = next_.sizes.u;
-    grow(extents_.stress, stress_size(layout_, problem_, next_.shape(), next_.straining()).largest);
+    grow(extents_.stress, stress_size(layout_, problem_, next_.shape(), next_.straining(), next_.theta).largest);
   }
   if (!systems_->contact || contact.force.size() == 0) return;
   grow(extents_.contact_force, contact.force.template lpNorm<Eigen::Infinity>());

@@ -67,7 +67,8 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     WARMSLIP_PETSC(VecCopy(change_w, change_u));
     WARMSLIP_PETSC(VecScale(change_u, systems_->k));
     const bool known = sample && *sample > 0;
-    const StressSize there = known ? StressSize{} : stress_size(layout_, problem_, next_.shape(), next_.straining());
+    const StressSize there =
+        known ? StressSize{} : stress_size(layout_, problem_, next_.shape(), next_.straining(), next_.theta);
     note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
          1e-8 * there.possible);
     extents_.force = std::max(extents_.force, balances.force_scale);

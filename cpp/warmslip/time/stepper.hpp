@@ -226,6 +226,7 @@ class Stepper {
   void coupled_heat_defect(const StepInputs& inputs, std::optional<int> sample);
   Balances balances_of(const StepLoads& loads, const ContactSolution<d>& contact);
   void add_heat_of_error(const StepLoads& loads);
+  void add_stress_of_temperature();
   void add_motion_of_error(const ContactSolution<d>& contact);
   void add_drift(const Eigen::VectorXd& motions, bool lands);
   void split(Vec coupled, Vec w, Vec theta) const;

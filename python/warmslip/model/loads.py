@@ -48,8 +48,10 @@ def given_displacement(held: Any) -> Data:
     return data([0.0 if one == "free" else one for one in held] if isinstance(held, list) else held.normal)
 
 
-def of_time(data: Data) -> bool:
-    """Whether the datum may change with time; a function that does not say otherwise may."""
+def of_time(data: Data, component: int | None = None) -> bool:
+    """Whether the datum, or one component of it, may change with time; a function that does not say otherwise may."""
+    if component is not None and isinstance(data, Formula):
+        return data.components[component].of_time
     return bool(getattr(data, "of_time", callable(data)))
 
 

@@ -195,7 +195,7 @@ class Supports:
     @cached_property
     def still(self) -> Supports:
         """Those that do not move."""
-        return Supports([support for support in self.parts if not of_time(support.given)], self.positions)
+        return Supports([s for s in self.parts if not of_time(s.given, s.component)], self.positions)
 
     @property
     def meet(self) -> bool:
