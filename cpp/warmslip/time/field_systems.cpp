@@ -22,6 +22,21 @@ double largest_here(Vec v) {
   return entries.size() ? entries.lpNorm<Eigen::Infinity>() : 0;
 }
 
+// The largest magnitudes by axis of this rank, found for several nodes at once.
+template <int d>
+Eigen::Vector3d reach_here(Vec v) {
+  constexpr int wide = 8 * d;
+  Values values(v);
+  const auto entries = *values;
+  Eigen::Array<double, wide, 1> largest = Eigen::Array<double, wide, 1>::Zero();
+  Eigen::Index i = 0;
+  for (; i + wide <= entries.size(); i += wide) largest = largest.max(entries.template segment<wide>(i).array().abs());
+  for (; i < entries.size(); ++i) largest[i % d] = std::max(largest[i % d], std::abs(entries[i]));
+  Eigen::Vector3d reach = Eigen::Vector3d::Zero();
+  reach.head(d) = largest.reshaped(d, wide / d).rowwise().maxCoeff();
+  return reach;
+}
+
 }  // namespace
 
 template <int d>
@@ -40,11 +55,13 @@ void Stepper<d>::products(TimeLevel& level) const {
     if (from != 0) WARMSLIP_PETSC(VecShift(warmer_, -from));
     multiply(operators_.expansion, from != 0 ? warmer_ : level.theta, level.expansion_theta);
   }
-  std::array<double, 4> largest{largest_here(level.shape()), largest_here(level.w), largest_here(level.strained_w),
-                                largest_here(level.theta)};
-  MPI_Allreduce(MPI_IN_PLACE, largest.data(), 4, MPI_DOUBLE, MPI_MAX, layout_.comm());
-  level.sizes = {largest[0], largest[1], level.strained_w ? largest[2] : largest[1], largest[3]};
-  if (level.u) WARMSLIP_PETSC(VecStrideNormAll(level.u, NORM_INFINITY, level.reach.data()));
+  const Eigen::Vector3d reach = reach_here<d>(level.u);
+  const auto largest = over_ranks(
+      layout_.comm(), std::array{largest_here(level.strained), largest_here(level.w), largest_here(level.strained_w),
+                                 largest_here(level.theta), reach[0], reach[1], reach[2]});
+  level.reach = {largest[4], largest[5], largest[6]};
+  level.sizes = {level.strained ? largest[0] : level.reach.maxCoeff(), largest[1],
+                 level.strained_w ? largest[2] : largest[1], largest[3]};
   if (surface_.points() > 0) level.contact_u = surface_.at_points(surface_.nodal_values(level.u));
 }
 
