@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.boxes import completed, field
 
 import warmslip
 from warmslip.model.discretisation import discretise
@@ -13,6 +14,7 @@ from warmslip.scene.errors import SceneError
 from warmslip.scene.full import full_model
 from warmslip.scene.reader import build
 from warmslip.scene.scene import Scene
+from warmslip.simulation import summary
 
 YOUNG, POISSON, ALPHA, ROOM = 200.0, 0.3, 1e-3, 293.0
 COUPLINGS = ("staggered", "lagged", "monolithic")
@@ -130,6 +132,43 @@ def test_a_free_body_expands_by_alpha(assumption: str) -> None:
     along = -YOUNG * ALPHA * 10 if assumption == "plane_strain" else 0.0
     assert d.stress_zz(done.u, done.w, done.theta) == pytest.approx(along, abs=1e-10)
     assert d.mises_of(done.u, done.w, done.theta) == pytest.approx(abs(along), abs=1e-10)
+
+
+@pytest.mark.parametrize("load", [1e-7, 1e-9, 1e-11])
+@pytest.mark.parametrize("coupling", COUPLINGS)
+@pytest.mark.parametrize("assumption", ["plane_stress", "solid"])
+def test_a_small_stress_beside_free_expansion_has_the_digits_that_are_stated(
+    assumption: str, coupling: str, load: float
+) -> None:
+    """Elastic and thermal stress of 1e-4 cancel but for that of the load, which is the same everywhere."""
+    d = 3 if assumption == "solid" else 2
+    held = {"left": [0.0, *["free"] * (d - 1)], "bottom": [*["free"] * (d - 1), 0.0]}
+    if d == 3:
+        held["front"] = ["free", 0.0, "free"]
+    scene = build(
+        {
+            "mesh": {"shape": "cube" if d == 3 else "square", "n": 2},
+            "time": {"end": 12.0, "steps": 2, "coupling": coupling},
+            "elasticity": {"young": 1.0, "poisson": POISSON, "assumption": assumption},
+            "heat": {
+                "conductivity": 14.0,
+                "capacity": 1.0,
+                "source": 1.0 if coupling == "monolithic" else 0.0,  # the others expand by the temperature before
+                "expansion": {"alpha": 1e-5, "reference_temperature": 20.0},
+            },
+            "initial": {"temperature": 20.0 if coupling == "monolithic" else 32.0},
+            "supports": {"displacement": held},
+            "loads": {"traction": {"top": [*[0.0] * (d - 1), load]}},
+        }
+    )
+    simulation = completed(scene, digits=0.0)
+    exact = np.zeros((d, d))
+    exact[-1, -1] = load
+    stress = simulation.discretisation.stress(*(field(simulation, name) for name in ("u", "w", "theta")))
+    stated = summary.digits(simulation.statistics.trusted(simulation.stepper.extents))["stress"]
+    error = np.abs(stress - exact).max() / load
+    assert error <= 10 * 10**-stated, (error, stated)
+    assert stated >= -np.log10(1e-4 / load * 1e-15) - 4, (error, stated)  # no fewer than it has by far
 
 
 def test_alpha_takes_the_elasticity_of_the_region() -> None:

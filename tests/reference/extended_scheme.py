@@ -125,8 +125,10 @@ class Scheme:
         for node, value in self.held("displacement", 0.0).items():
             u[node] = value
         for part in supports.displacement:
-            if part not in supports.moved:
-                w[self._nodes(part)] = 0
+            # a component that moves has the velocity that is given
+            for c, value in enumerate(supports.moved.get(part, [0.0] * self.d)):
+                if not isinstance(value, str):
+                    w[self._nodes(part), c] = 0
         for node, value in self.held("temperature", 0.0).items():
             theta[node] = value[0]
         return State(big(u), big(w), big(theta), zeros(len(self.points), self.d))

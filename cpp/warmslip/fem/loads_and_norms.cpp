@@ -188,12 +188,13 @@ StressSize stress_size(const Layout<d>& layout, const Problem<d>& problem, Vec u
     };
     add(material.elasticity, u, local_u, size_u);
     add(material.viscosity, w, local_w, size_w);
-    found[0] = std::max(found[0], stress.norm());
+    Tensor2<d> whole = from_mandel<d>(stress);
     if (theta && material.expansion) {
       double warmer = 0;
       for (int i = 0; i <= d; ++i) warmer += (local_theta[layout.local_cells()(c, i)] - material.reference) / (d + 1);
-      found[0] = std::max(found[0], (from_mandel<d>(stress) - warmer * *material.expansion).norm());
+      whole -= warmer * *material.expansion;
     }
+    found[0] = std::max(found[0], whole.norm());
     found[1] = std::max(found[1], possible);
   }
   MPI_Allreduce(MPI_IN_PLACE, found, 2, MPI_DOUBLE, MPI_MAX, layout.comm());

@@ -101,8 +101,8 @@ class Norms {
   std::vector<Simplex<d>> cells_;
 };
 
-/// The largest |A eps(u) + B eps(w)| of a cell (Frobenius norm), with and without -M (theta - reference), for given
-/// fields, null where there is none, and the largest that u and w of these sizes could have (collective).
+/// The largest |A eps(u) + B eps(w) - M (theta - reference)| of a cell (Frobenius norm) for given fields, null where
+/// there is none, and the largest that u and w of these sizes could have (collective).
 struct StressSize {
   double largest = 0, possible = 0;
 };
