@@ -1267,7 +1267,7 @@ class Stepper2:
     @property
     def extents(self) -> typing.Annotated[list[float], "FixedSize(18)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements of contact points, by axis.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1493,7 +1493,7 @@ class Stepper3:
     @property
     def extents(self) -> typing.Annotated[list[float], "FixedSize(18)"]:
         """
-        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements of contact points, by axis.
+        Of displacement, temperature, stress and contact force so far: the largest value, that or what rounding may make of it, and the largest estimated change; then the largest nodal force, the displacement at the last look at the stress, the largest velocity, and the largest displacements, by axis.
         """
     @property
     def contact_compliance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

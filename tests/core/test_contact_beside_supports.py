@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,69 @@ def weak_and_stiff_springs(d: int) -> None:
     one, mesh = turned(penalty, turn)
     simulation = Simulation(one, discretisation=discretise(one, mesh=mesh))
     assert len(list(simulation.steps())) == 4, simulation.failure
+
+
+@check
+def a_weak_spring_along_the_floor(d: int) -> None:
+    """A block without inertia rests on a rough floor, which leaves it no place along it; a weak spring hardly holds it."""
+    for spring, friction, gap in itertools.product((1e-6, 1e-9, 1e-12, 1e-15), (0.0, 0.01, 0.2, 1.0), (0.0, 0.01)):
+        if friction == 0 and spring < 1e-12:
+            continue  # where it stands hangs on rounding
+        one = pressed(
+            d,
+            {},
+            n=2,
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.3),
+            supports={"springs": {"top": {"stiffness": [*[spring] * (d - 1), 0.0]}}},
+            loads={"body": along(d, -1e-3)},
+            contact={"part": "bottom", "stiffness": 5.0, "gap": gap, "friction": {"coefficient": friction}},
+        )
+        simulation = completed(one, digits=0.0)
+        assert simulation.report.normal_force == pytest.approx(1e-3, rel=1e-9), (spring, friction, gap)
+        stated = summary.digits(simulation.statistics.trusted(simulation.stepper.extents))
+        assert min(stated["stress"], stated["contact_force"]) >= 10, (spring, friction, gap, stated)
+
+
+@check
+def a_weak_spring_stops_a_slide_and_no_flight(d: int) -> None:
+    """It bears what friction leaves of a push, however far the body goes, and nothing across its axis."""
+    for spring in (1e-6, 1e-16):
+        keys = {
+            "n": 1,
+            "time": {"steps": 1},
+            "elasticity": elasticity(d, 1.0, 0.3),
+            "supports": {"springs": {"top": {"stiffness": [*[spring] * (d - 1), 0.0]}}},
+            "contact": {"part": "bottom", "stiffness": 5.0, "friction": {"coefficient": 0.2}},
+        }
+        pushed = completed(pressed(d, {}, loads={"body": along(d, -1e-3, 3e-4)}, **keys), digits=4.0)
+        assert field(pushed, "u")[:, 0].mean() == pytest.approx(1e-4 / spring, rel=1e-2)
+        simulation = Simulation(pressed(d, {}, loads={"body": along(d, 1e-3)}, **keys))
+        assert not list(simulation.steps())
+        assert simulation.outcome == "unsupported"
+
+
+@check
+def a_spring_along_a_roller(d: int) -> None:
+    """Rollers bear a load that is large beside the spring; what they leave free has no part against them."""
+    spring, warm = 5e-10, {"conductivity": 1.0, "expansion": {"tensor": 1e-4, "reference_temperature": 1.0}}
+    for load in (0.0, 1e-8):
+        one = pressed(
+            d,
+            {"top": [*["free"] * (d - 1), 0.0]},
+            n=1,
+            time={"steps": 1},
+            elasticity=elasticity(d, 1.0, 0.3),
+            heat=warm,
+            initial={"temperature": 1.02},
+            loads={"body": along(d, -4e-8, load)},
+            contact={"part": "bottom", "stiffness": 0.5},
+        )
+        one = one.override(**{"supports.springs": {"top": {"stiffness": [*[spring] * (d - 1), 0.0]}}})
+        u = field(completed(one, digits=12.0), "u")
+        top = np.asarray(discretise(one).mesh.parts["top"])
+        mean = u[top].mean(axis=(0, 1))  # facets have one size: the mean over the part
+        assert abs(mean[0] - load / spring) <= 1e-13 * max(np.abs(u).max(), load / spring)
 
 
 @check

@@ -158,11 +158,14 @@ void ContactSolver<d>::factor(const ContactProblem<d>& problem, const Linearisat
   if (tangent_.rows() != n + m) tangent_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n + m);
   if (n + m > 0) tangent_.compute(tangent);
   // without mass the points in contact alone hold the body
-  solution.unsupported = unsupported_ = m > 0 && rigid_.inertia.isZero(0) && singular(tangent_);
+  const auto weightless = [&] {
+    Eigen::MatrixXd out = tangent;
+    out.bottomRightCorner(m, m) = resisted_;
+    return Eigen::PartialPivLU<Eigen::MatrixXd>(out);
+  };
+  solution.unsupported = unsupported_ = m > 0 && !massive_ && singular(resisted_.isZero(0) ? tangent_ : weightless());
   if (spring_ > 0) {
-    Eigen::MatrixXd weightless = tangent;
-    weightless.bottomRightCorner(m, m) -= rigid_unit_ * rigid_.inertia;
-    if (singular(Eigen::PartialPivLU<Eigen::MatrixXd>(weightless))) {
+    if (singular(weightless())) {
       tangent.bottomRightCorner(m, m).diagonal().array() += rigid_unit_ * spring_;
       tangent_.compute(tangent);  // the load then moves the body until something holds it
     }

@@ -34,10 +34,25 @@ ContactSolver<d>::ContactSolver(Eigen::MatrixXd compliance, ContactOptions optio
   compliance_norm_ = compliance_.size() ? compliance_.cwiseAbs().rowwise().sum().maxCoeff() : 0;
   rigid_unit_ = compliance_norm_ > 0 ? compliance_norm_ : 1;
   carried_ = Eigen::MatrixXd::Zero(d, compliance_.rows());
-  if (rigid_.count() == 0 || rigid_.inertia.isZero(0)) return;
+  find_resisted();
+  if (!massive_) return;
   const Eigen::MatrixXd velocities = rigid_.inertia.fullPivLu().solve(rigid_.loads.transpose());
   for (Eigen::Index row = 0; row < compliance_.rows(); row += d)
     carried_.middleCols<d>(row) = rigid_.motions.middleRows<d>(row) * velocities.middleCols<d>(row);
+}
+
+// Which motions a mass or a spring resists, however weakly: each counts against its own.
+template <int d>
+void ContactSolver<d>::find_resisted() {
+  const Eigen::Index m = rigid_.count();
+  resisted_ = Eigen::MatrixXd::Zero(m, m);
+  if (m == 0 || rigid_.inertia.isZero(0)) return;
+  const Eigen::VectorXd own =
+      rigid_.inertia.diagonal().unaryExpr([](double h) { return h > 0 ? 1 / std::sqrt(h) : 0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> found(own.asDiagonal() * rigid_.inertia * own.asDiagonal());
+  const Eigen::VectorXd counts = found.eigenvalues().unaryExpr([](double one) { return one > 1e-12 ? 1.0 : 0.0; });
+  massive_ = counts.minCoeff() > 0;
+  resisted_ = found.eigenvectors() * counts.asDiagonal() * found.eigenvectors().transpose();
 }
 
 template <int d>
@@ -50,7 +65,7 @@ ContactSolution<d> ContactSolver<d>::solve(const ContactProblem<d>& problem, con
   solution.velocity = problem.free;
   solution.rigid = Eigen::VectorXd::Zero(rigid_.count());
   if (!problem.free.allFinite()) return solution;
-  const bool massive = rigid_.count() > 0 && !rigid_.inertia.isZero(0);
+  const bool massive = massive_;
   // the rigid motions under the forces that are there: their equations then hold in every iterate
   const auto move = [&] {
     solution.rigid.setZero();

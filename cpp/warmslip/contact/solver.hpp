@@ -60,6 +60,7 @@ class ContactSolver {
   bool newton_with_spring(const ContactProblem<d>& problem, bool line_search, ContactSolution<d>& solution);
   void stick_at_one_point(const ContactProblem<d>& problem, ContactSolution<d>& solution);
   bool newton_with_lent_mass(const ContactProblem<d>& problem, ContactSolution<d>& solution);
+  void find_resisted();
   bool accept(const ContactProblem<d>& problem, ContactSolution<d>& solution, double rest = unlimited) const;
   PointCompliance diagonal_block(const ContactProblem<d>& problem, std::size_t point) const;
 
@@ -74,6 +75,8 @@ class ContactSolver {
   bool lent_ = false;                // whether its mass is lent by the solver of a body without mass
   bool carries_ = false;             // whether a point's own compliance includes the rigid motions
   bool terms_cancel_ = false;        // whether rounding of terms that cancel is no residual, see accept
+  bool massive_ = false;             // whether a mass or springs resist every rigid motion
+  Eigen::MatrixXd resisted_;         // projector onto the rigid motions that they resist, (motions, motions)
   double rigid_unit_ = 1;            // velocity per force, the unit of the rigid motions
   double compliance_norm_ = 0;       // largest row sum of |compliance|, a bound on its eigenvalues
   std::vector<int> tangent_status_;  // statuses the tangent below belongs to

@@ -72,7 +72,11 @@ Eigen::MatrixXd unresisted(Eigen::MatrixXd z, const std::vector<Index>& nodes, c
   };
   Eigen::Index held = 0;  // singular values fall
   while (held < motions && resists(held)) ++held;
-  return z * found.matrixV().rightCols(motions - held);
+  // a motion that supports leave to rounding moves against their reactions, which a weak spring would have to bear
+  const auto exact = [](double entry) {
+    return std::abs(entry - std::round(entry)) < 1e-14 ? std::round(entry) : entry;
+  };
+  return z * found.matrixV().rightCols(motions - held).unaryExpr(exact);
 }
 
 // The unknowns of a motion in a vector of the operator, whose further ones of a node come after them.

@@ -133,7 +133,7 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       if (fixed) continue;
       raise(applied, given + (warm ? expands : 0));
       raise(strained, stretches);
-      raise(inner, within);
+      raise(inner, std::max(within, moved));
       raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
     }
   }
@@ -149,7 +149,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
   l.force_defect = relative(largest[defect], largest[acting]);
-  // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u makes are none
+  // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u or of a momentum
+  // makes are none
   const bool loaded = largest[applied] > 1e-14 * largest[inner];
   l.force_scale =
       loaded ? std::max(largest[applied], largest[strained]) : std::max(largest[acting], 1e-11 * largest[inner]);

@@ -77,21 +77,17 @@ RigidMotions::Resisted resisted(const Problem<d>& problem, bool on_springs) {
   return {directions.nodes, {directions.rows.begin(), directions.rows.end()}};
 }
 
-// Whether springs or dashpots hold some node about as well as the body around it does.
-template <int d>
-bool springs_hold(const Operators<d>& operators, double k, int width, Mat a) {
-  const VecHandle diagonal = diagonal_of(a);
-  Values entries(diagonal);
-  const Eigen::Index nodes = (*entries).size() / width;
-  int holds = 0;
-  for (const auto& [part, size] : {std::pair{Mat(operators.springs), k}, std::pair{Mat(operators.dashpots), 1.0}}) {
-    if (!part) continue;
-    const VecHandle own = diagonal_of(part);
-    Values held(own);
-    if ((size * (*held).reshaped(d, nodes).array() > 0.3 * (*entries).reshaped(width, nodes).topRows(d).array()).any())
-      holds = 1;
-  }
-  MPI_Allreduce(MPI_IN_PLACE, &holds, 1, MPI_INT, MPI_LOR, PetscObjectComm(reinterpret_cast<PetscObject>(a)));
+// Whether a part of an operator, times its factor, holds some node about as well as the body around it does.
+bool holds_a_node(Mat part, double factor, Mat whole) {
+  if (!part) return false;
+  const VecHandle own = diagonal_of(part), all = diagonal_of(whole);
+  const Eigen::Index block = block_size(own), width = block_size(all);
+  Values held(own), entries(all);
+  const Eigen::Index nodes = (*held).size() / block;
+  int holds =
+      (factor * (*held).reshaped(block, nodes).array() > 0.3 * (*entries).reshaped(width, nodes).topRows(block).array())
+          .any();
+  MPI_Allreduce(MPI_IN_PLACE, &holds, 1, MPI_INT, MPI_LOR, PetscObjectComm(reinterpret_cast<PetscObject>(part)));
   return holds != 0;
 }
 
@@ -161,6 +157,7 @@ template <int d>
 void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& problem, const Operators<d>& operators,
                                    const ContactSurface<d>& surface, Mat a, int width, Symmetry symmetry,
                                    const std::string& name, Backend backend) {
+  bool partly = false;  // whether there are rigid motions that not even springs resist
   if (problem.has(&Material<d>::elasticity) || problem.has(&Material<d>::viscosity)) {
     const Eigen::VectorXd firmness = at_nodes(problem, [&](const Material<d>& m) {
       return (m.elasticity ? k * m.elasticity->norm() : 0) + (m.viscosity ? m.viscosity->norm() : 0);
@@ -169,18 +166,22 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
       return RigidMotions(layout, d, width, resisted(problem, springs), parts_in_contact(problem, true), firmness);
     };
     rigid = left_by(true);
-    // springs that leave no motion hold them like a mass
-    if (!problem.springs.empty() && rigid.empty()) {
+    partly = !rigid.empty();
+    // springs hold motions as a mass does; where they leave some to a mass or to contact, only if they are weak
+    const bool strong = holds_a_node(operators.springs, 1, operators.elasticity) ||
+                        holds_a_node(operators.dashpots, 1, operators.viscosity);
+    if (!problem.springs.empty() && !(partly && (problem.inertial() || strong))) {
       rigid = left_by(false);
       sprung = !rigid.empty();
     }
   }
-  if (!rigid.empty() && !sprung && !problem.inertial() && surface.points() == 0)
+  if (partly && !problem.inertial() && surface.points() == 0)
     throw std::invalid_argument(
         "nothing holds the body: its supports leave it, or a part of it, a rigid motion, and it has no inertia and no "
         "contact; hold one more place or component, or give inertia.density > 0");
-  const bool apart = !rigid.empty() && !mass_holds(operators.inertia, k, width, a) &&
-                     !(sprung && springs_hold<d>(operators, k, width, a));
+  const bool apart =
+      !rigid.empty() && !mass_holds(operators.inertia, k, width, a) &&
+      !(sprung && !partly && (holds_a_node(operators.springs, k, a) || holds_a_node(operators.dashpots, 1, a)));
   if (apart) rigid.add_springs(a);
   support_scales = warmslip::support_scales(layout, operators.inclined, a, width);
   momentum = factor(a, surface.unknowns(width), symmetry, width, name, backend);
