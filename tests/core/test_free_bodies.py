@@ -186,6 +186,23 @@ def dense(operator: Any) -> Any:
     return np.column_stack(columns)
 
 
+@check
+def a_body_glides_along_a_foundation(d: int) -> None:
+    """Without a weight it presses on nothing: what rounding makes it press needs no digits."""
+    for speed, stiffness in ((0.7, 10.0), (0.7, "rigid"), (1.0, 10.0)):
+        one = scene(
+            d,
+            3,
+            time={"end": 3.0, "steps": 3},
+            inertia={"density": 1.0},
+            elasticity=elasticity(d, 1.0, 0.2),
+            initial={"velocity": along(d, 0.0, speed)},
+            contact={"part": "bottom", "stiffness": stiffness, "friction": {"coefficient": 0.3}},
+        )
+        u = field(completed(one, digits=0.0), "u")
+        assert np.abs(u - along(d, 0.0, 3 * speed)).max() <= 1e-13
+
+
 @pytest.mark.parametrize("backend", ["automatic", "petsc"])
 @pytest.mark.parametrize("density", [1e-3, 1.0, 100.0])
 def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend: str) -> None:

@@ -146,6 +146,22 @@ def shapes_are_the_formulas_of_their_gaps(d: int) -> None:
         assert np.abs(np.subtract(*gaps)).max() <= 1e-14, formula
 
 
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("radius", [1.0, 1e3, 1e8])
+def test_gaps_to_a_nearly_flat_crown_keep_their_digits(d: int, radius: float) -> None:
+    """The sagitta s^2 / (R + sqrt(R^2 - s^2)) of points at a distance s from the crest, and a gap of a millionth there."""
+    gap = {"shape": "cylinder" if d == 2 else "sphere", "at": along(d, -radius, 0.5), "radius": radius}
+    there = discretise(
+        scene(d, 4, elasticity=elasticity(d, 1.0, 0.3), contact={"part": "bottom", "stiffness": 1.0, "gap": gap})
+    )
+    x = np.asarray(there.surface.positions)
+    square = ((x - along(d, 0.0, 0.5))[:, : d - 1] ** 2).sum(axis=1)
+    exact = square / (radius + np.sqrt(np.maximum(radius**2 - square, 0.0)))
+    found = there.load_vectors.on_points("gap", 0.0)
+    inside = square < radius**2
+    assert np.abs(found - exact)[inside].max() <= 1e-14 * exact[inside].max()
+
+
 def test_gaps_to_any_wedge_are_where_a_ray_enters_it() -> None:
     """Random wedges, faces that turn away and steps included, against points along the ray one by one."""
     random, along_ray = np.random.default_rng(5), np.linspace(-3, 3, 60001)

@@ -88,11 +88,16 @@ def _to_ball(away: Array, directions: Array, radius: float) -> tuple[Array, Any]
     """Along directions (points, d), of a length of at most 1, to a circle or sphere about the points that `away` leads to."""
     length2 = np.maximum((directions**2).sum(axis=1), 1e-300)
     middle = (away * directions).sum(axis=1) / length2  # where the ray comes nearest to the centre
-    past2 = (away**2).sum(axis=1) - middle**2 * length2  # squared distance there
-    half2 = (radius**2 - past2) / length2
-    half = np.sqrt(np.maximum(half2, 0))
-    meets = (half2 >= 0) & (middle + half >= 0)
-    return np.where(meets, middle - half, _beside(away) + radius), meets
+    # of a large radius the differences of squares keep no digit: |away|^2 - radius^2 by its largest component
+    size = np.abs(away)
+    most = size.max(axis=1)
+    rest2 = (np.sort(size, axis=1)[:, :-1] ** 2).sum(axis=1)
+    outside = ((most - radius) * (most + radius) + rest2) / length2
+    half2 = middle**2 - outside
+    far = middle + np.sqrt(np.maximum(half2, 0))
+    meets = (half2 >= 0) & (far >= 0)
+    near = np.divide(outside, far, out=np.zeros_like(far), where=far > 0)
+    return np.where(meets, near, _beside(away) + radius), meets
 
 
 def _beside(away: Array) -> Array:
