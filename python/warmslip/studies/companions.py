@@ -201,7 +201,9 @@ def coarser(scene: Scene, times: int = 1) -> Scene:
         multiple = divisor * max(1, round(common / divisor), math.ceil(least / min(unit) / divisor))
         wanted = [one * multiple for one in unit]
         n = wanted[0] if len(set(wanted)) == 1 else wanted
-        raise SceneError(f"mesh.n = {table.n}: the mesh cannot be halved {times} times; give n = {n}")
+        raise SceneError(
+            f"mesh.n = {table.n}: the mesh cannot be halved {times} times to two cells or more along each side; give n = {n}"
+        )
     halves = [count // divisor for count in counts]
     return scene.override(**{"mesh.n": halves[0] if isinstance(table.n, int) else halves})
 
