@@ -43,8 +43,6 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
   if (!force.allFinite() || !motion.allFinite() || !std::isfinite(max_speed))
     return std::numeric_limits<double>::infinity();
   largest = std::max(largest, max_bound);
-  // a body that moves along one axis is where it is along another to the rounding of that motion
-  motion = motion.cwiseMax(1e-6 * problem.step * max_speed);
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];

@@ -208,7 +208,7 @@ StepInputs Stepper<d>::inputs(const StepLoads& loads, const ContactSolution<d>& 
           loads.foundation,
           drive_,
           loads.support_velocity,
-          1e-5 * extents_.motion};
+          1e-5 * extents_.motion.cwiseMax(next_.reach)};
 }
 
 // What follows from the velocity (and, monolithic, from the temperature) of the step: u, theta and the products.

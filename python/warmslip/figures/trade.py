@@ -19,7 +19,7 @@ ORDINARY, FACTORED, SNES, GETFEM = OTHERS = ("ordinary Newton", "SciPy, factored
 
 
 class Look(NamedTuple):
-    """How a curve is drawn, and what is typed to have it; N is the number of cells along a side."""
+    """How a curve is drawn, and what is typed to have it, with N cells along a side and the M equal steps that go with them."""
 
     typed: str
     colour: str
@@ -30,10 +30,10 @@ class Look(NamedTuple):
 
 THIN, DOTTED, DASHED = 0.7, (0, (1, 1)), (0, (4, 2))
 CORNERS = "mesh.graded_to=['corners']"
-GRADED = "time.graded_to=[0.0] time.halvings=8 time.steps=N/4"
-MORE = "time.graded_to=[0.0] time.halvings=6 time.steps=N"
+GRADED = "time.graded_to=[0.0] time.halvings=8 time.steps=M/4"
+MORE = "time.graded_to=[0.0] time.halvings=6 time.steps=M"
 LOOKS = {
-    "equal steps": Look("mesh.n=N time.steps=N", INK, "o"),
+    "equal steps": Look("mesh.n=N time.steps=M", INK, "o"),
     "equal steps, lagged": Look("time.coupling=lagged", GREY, "h", width=THIN),
     "equal steps, monolithic": Look("time.coupling=monolithic", PURPLE, "s", width=THIN),
     "equal steps, gauss-2": Look("contact.quadrature=gauss-2", SKY, "D", width=THIN),
@@ -42,12 +42,12 @@ LOOKS = {
     "equal steps, regularised friction": Look("contact.friction.regularisation=1e-2", GREY, "X", DASHED, THIN),
     "graded steps": Look(GRADED, ORANGE, "^"),
     "more graded steps": Look(MORE, ORANGE, "<", width=2),
-    "adaptive steps": Look("time.tolerance=16/N^2 time.steps=8", GREEN, "v"),
-    "adaptive steps, smaller tolerance": Look("time.tolerance=4/N^2 time.steps=8", GREEN, "<"),
+    "adaptive steps": Look("time.tolerance=16/M^2 time.steps=8", GREEN, "v"),
+    "adaptive steps, smaller tolerance": Look("time.tolerance=4/M^2 time.steps=8", GREEN, "<"),
     "graded mesh": Look(CORNERS, GREY, "d"),
     "graded mesh and steps": Look(f"{CORNERS} {GRADED}", VERMILLION, "^"),
     "graded mesh, more graded steps": Look(f"{CORNERS} {MORE}", VERMILLION, "<", width=2),
-    "graded mesh, adaptive steps": Look(f"{CORNERS} time.tolerance=16/N^2", BLUE, "v"),
+    "graded mesh, adaptive steps": Look(f"{CORNERS} time.tolerance=16/M^2 time.steps=8", BLUE, "v"),
     ORDINARY: Look("other_codes.py --code ordinary-Newton", INK, "P", DOTTED),
     FACTORED: Look("other_codes.py --code SciPy,-factored-once", INK, "*", DOTTED),
     SNES: Look("other_codes.py --code PETSc-SNES", BLUE, "P", DOTTED),
@@ -92,6 +92,7 @@ def trade(inputs: list[Path]) -> tuple[Figure, str]:
             ax.set_ylabel("largest error over time")
         captions.append(_best(name, rows))
     figure.legend(list(handles.values()), list(handles), ncol=2, fontsize=7.5, loc="outside upper center")
+    captions.append("N cells along a side, M equal steps that go with them: the column `setting` has both.")
     return figure, " ".join(captions)
 
 

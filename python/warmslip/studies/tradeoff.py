@@ -162,7 +162,7 @@ def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[R
     for method in contest.methods:
         for n in contest.levels:
             if method in SHORT_STEPS and 2 * n > contest.reference // 2:
-                continue  # its steps are as short as those of the reference
+                continue  # its steps come near to those of the reference
             try:
                 entries.append((method, n, contest.at(method, n), contest.typed(method, n)))
             except (SceneError, ValueError) as why:
@@ -198,9 +198,11 @@ def front(contest: str, rows: Sequence[Row], quantity: str) -> list[Row]:
         row for row in rows if row["method"] in {*METHODS} - {*KNOBS} and row["cpu_seconds"] > 0 and row[quantity] > 0
     ]
     best: list[Row] = []
+    least = float("inf")  # of all that are cheaper
     for row in sorted(own, key=lambda row: row["cpu_seconds"]):
-        if not best or row[quantity] < WORTH * best[-1][quantity]:
+        if row[quantity] < WORTH * least:
             best.append(row)
+        least = min(least, row[quantity])
     equal = [row for row in own if row["method"] == "equal steps"]
 
     def gain(row: Row) -> float:
