@@ -64,8 +64,8 @@ template <int d>
 void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after, const StepInputs& in, Balances& l) {
   Resultant<d> force;
   double work = 0;
-  enum { defect, backward, acting, applied, strained, inner };
-  std::array<double, 6> largest{};
+  enum { defect, backward, acting, applied, pressed, strained, inner, carried };
+  std::array<double, 8> largest{};
   const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
                w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta,
@@ -131,9 +131,11 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       }
       work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();
       if (fixed) continue;
-      raise(applied, given + (warm ? expands : 0));
+      raise(applied, size(load) + (warm ? expands : 0));
+      raise(pressed, size(contact_here));
       raise(strained, stretches);
-      raise(inner, std::max(within, moved));
+      raise(inner, within);
+      raise(carried, moved);
       raise(acting, std::max({moved, given, stretches, size(at(*e0)), expands}));
     }
   }
@@ -149,8 +151,10 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   for (Eigen::Index i = 0; i < sums.size(); ++i)
     l.force_residual = std::max(l.force_residual, relative(sums[i], sizes[i]));
   l.force_defect = relative(largest[defect], largest[acting]);
-  // where no force is applied, or a contact force of rounding alone, forces of a size that rounding of u or of a momentum
-  // makes are none
+  // a contact force may be rounding of u or of a momentum
+  if (largest[pressed] > 1e-14 * std::max(largest[inner], largest[carried]))
+    largest[applied] = std::max(largest[applied], largest[pressed]);
+  // where no force is applied, forces of a size that rounding of u makes are none
   const bool loaded = largest[applied] > 1e-14 * largest[inner];
   l.force_scale =
       loaded ? std::max(largest[applied], largest[strained]) : std::max(largest[acting], 1e-11 * largest[inner]);
