@@ -203,6 +203,29 @@ def a_body_glides_along_a_foundation(d: int) -> None:
         assert np.abs(u - along(d, 0.0, 3 * speed)).max() <= 1e-13
 
 
+@check
+def a_body_falls_along_a_wall(d: int) -> None:
+    """Nothing moves across the rough wall: what a penetration of rounding presses is no force."""
+    nearly_incompressible = {"lame": [447682.68965037086, 17.09268943094196]}, 11, 3.2842745942576834
+    other = {"lame": [14.530264185686034, 122.00407268713775]}, 18, 1.2116123276488389
+    for n, (lame, steps, end) in ((6 if d == 2 else 2, nearly_incompressible), (3, other)):
+        for stiffness in ("rigid", 62436.0):
+            one = scene(
+                d,
+                n,
+                time={"end": end, "steps": steps},
+                inertia={"density": 0.54},
+                elasticity=lame,
+                viscosity={"lame": [1.0, 1.0]},
+                initial={"velocity": along(d, -1.0)},
+                loads={"body": along(d, -0.54 * 9.0)},
+                contact={"part": "left", "stiffness": stiffness, "friction": {"coefficient": 2.7}},
+            )
+            u, k = field(completed(one, digits=0.0), "u"), end / steps
+            fallen = end + 9.0 * k * k * steps * (steps + 1) / 2
+            assert np.abs(u - along(d, -fallen)).max() <= 1e-13 * fallen
+
+
 @pytest.mark.parametrize("backend", ["automatic", "petsc"])
 @pytest.mark.parametrize("density", [1e-3, 1.0, 100.0])
 def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend: str) -> None:

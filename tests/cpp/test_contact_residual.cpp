@@ -196,3 +196,23 @@ TEST_CASE_TEMPLATE("a flight and a distant wall excuse no force", D, Two, Three)
   CHECK(law_residual<d>(problem, force, velocity) <= 1e-15);
   CHECK(law_residual<d>(problem, 1.001 * force, velocity) >= 1e-4);
 }
+
+TEST_CASE_TEMPLATE("a fall along a wall has penetrations of rounding", D, Two, Three) {
+  constexpr int d = D::value;
+  const Point<d> down = -Point<d>::Unit(d - 1), west = -Point<d>::Unit(0);
+  for (const double stiffness : {1e9, unlimited}) {
+    ContactProblem<d> problem{{{{stiffness}, {0.3}}}, 0.5, {}, Eigen::VectorXd::Zero(2 * d)};
+    problem.points = {{west, 0.5, 0, 3 * down, 0}, {west, 0.5, 0, 3 * down, 0}};
+    for (const double depth : {1e-16, 1e-12}) {  // of the second point alone
+      Eigen::VectorXd force = Eigen::VectorXd::Zero(2 * d), velocity(2 * d);
+      velocity << 2 * down, 2 * down + depth / problem.step * west;
+      force.head<d>() = 1e-17 * (west + 0.3 * down);
+      const double found = law_residual<d>(problem, force, velocity);
+      CAPTURE(depth);
+      if (depth == 1e-16)
+        CHECK(found <= 1e-15);
+      else
+        CHECK(found >= 0.5);
+    }
+  }
+}

@@ -210,6 +210,7 @@ class Result:
     rescues: int  # steps in which Newton cycled
     seconds_setup: float  # CPU time of assembly and factorisations
     seconds_factor: float  # of the latter
+    seconds_compliance: float  # of what unit contact tractions do to the body
     seconds_loop: float  # CPU time of the time loop
 
 
@@ -250,7 +251,9 @@ def simulate(
     node = np.arange(m)  # the contact nodes come first; their unknowns are 2 node and 2 node + 1
     P = np.zeros((solver.shape[0], 2 * m), order="F")
     P[2 * node, node], P[2 * node + 1, m + node] = edge_weights(n), -edge_weights(n)
+    began = process_time()
     Y, sparse_P = solver.solve(P), sp.csr_matrix(P)
+    seconds_compliance = process_time() - began
 
     def local(field):  # tangential components, then normal ones, at the contact nodes
         return np.concatenate([field[0 : 2 * m : 2], -field[1 : 2 * m : 2]])
@@ -293,6 +296,7 @@ def simulate(
         contact.rescues,
         seconds_setup,
         sum(factoring),
+        seconds_compliance,
         seconds_loop,
     )
 

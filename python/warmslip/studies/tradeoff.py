@@ -111,6 +111,7 @@ STEPPING = ["equal steps", "graded steps", "more graded steps", "adaptive steps"
 HOT = {"contact.heat_exchange.foundation_temperature": 10.0}
 LEVELS = [8, 16, 20, 24, 32, 64, 128]  # of the paper's problem
 WORTH = 0.9  # ratio of errors from which on a dearer setting is worth a line of the front
+NEAR = 3  # cells of a reference for one of a contestant with short steps
 FINER = 4  # steps of a reference for one of a contestant with as many cells
 CONTESTS = {
     "paper_cold": Contest("paper_mixed", {}, list(METHODS), LEVELS, 192),
@@ -161,7 +162,7 @@ def run(contest: Contest, say: Callable[[str], None] = lambda _: None) -> list[R
     entries = [("reference, half", half, contest.at(kind, half, FINER), contest.typed(kind, half, FINER))]
     for method in contest.methods:
         for n in contest.levels:
-            if method in SHORT_STEPS and 2 * n > contest.reference // 2:
+            if method in SHORT_STEPS and NEAR * n > contest.reference:
                 continue  # its steps come near to those of the reference
             try:
                 entries.append((method, n, contest.at(method, n), contest.typed(method, n)))
