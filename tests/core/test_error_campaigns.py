@@ -20,7 +20,7 @@ def test_the_error_of_a_reference_is_added() -> None:
 
 def test_the_true_error_is_not_the_estimated_one() -> None:
     """It is found from finer runs: an answer that says too little of itself is seen."""
-    answer = ask.solve(asked.scene(9), 0.1)
+    answer = ask.solve(asked.scene(9, 10_000), 0.1)
     true = asked.true_error(answer)
     small = {name: dict.fromkeys(parts, 0.0) for name, parts in answer.parts.items()}
     bold = replace(answer, error=0.0, parts=small)  # its reference is taken to be exact
@@ -29,7 +29,7 @@ def test_the_true_error_is_not_the_estimated_one() -> None:
 
 def test_the_best_of_a_grid(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asked, "GRID", {2: ([8, 16], [8, 16], 32)})
-    one = asked.scene(9)
+    one = asked.scene(9, 10_000)
     found = asked.best_of_grid(one, ["u_V", "theta_L2"], 0.3)
     assert found["best"] != "none" and 0 < found["best_seconds"] < 1
     assert found["least_error"] <= 0.3

@@ -223,7 +223,10 @@ void Stepper<d>::add_coasting() {
 // that goes on measures the same ones.
 template <int d>
 bool Stepper<d>::measured_now(const StepLoads& loads, const ContactSolution<d>& contact) const {
-  if (loads.measured || (now_.contact_force.isZero(0) && !contact.force.isZero(0))) return true;
+  const auto touching = [](const Eigen::VectorXd& force) {
+    return (force.reshaped<Eigen::RowMajor>(force.size() / d, d).rowwise().squaredNorm().array() > 0).count();
+  };
+  if (loads.measured || touching(contact.force) > 2 * touching(now_.contact_force)) return true;
   if (contact.iterations > hard) return true;
   for (double step = 1, n = taken_ + 1; step <= n; step *= options_.measured_steps)
     if (step == n) return true;

@@ -38,7 +38,7 @@ struct StepperOptions {
   double error_bound = 1e-4;      ///< nor is one whose fields are known no better than this, see Digits
   double factor_bytes = 1e9;      ///< bound on the factors of step sizes that are kept for another use
   int measured_steps = 32;        ///< digits are estimated in step 1, in this one, in its square and so on, and in
-                                  ///< steps that touch the foundation after one that did not
+                                  ///< steps in which more than twice as many points touch as in the one before
 };
 
 /// Estimated relative errors of the fields of a step, from what a step of iterative refinement changes in them (contact
