@@ -47,6 +47,7 @@ LOOKS = {
     "graded mesh": Look(CORNERS, GREY, "d"),
     "graded mesh and steps": Look(f"{CORNERS} {GRADED}", VERMILLION, "^"),
     "graded mesh, more graded steps": Look(f"{CORNERS} {MORE}", VERMILLION, "<", width=2),
+    "graded mesh, fewer halvings": Look(f"{CORNERS} {MORE.replace('=6', '=5')}", VERMILLION, ">", DASHED),
     "graded mesh, adaptive steps": Look(f"{CORNERS} time.tolerance=16/M^2 time.steps=8", BLUE, "v"),
     ORDINARY: Look("other_codes.py --code ordinary-Newton", INK, "P", DOTTED),
     FACTORED: Look("other_codes.py --code SciPy,-factored-once", INK, "*", DOTTED),
