@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 from support.boxes import along, body, completed, elasticity, field, fields, misses, turned
-from support.guided import guides, planes, pressed
+from support.guided import SIDES, guides, planes, pressed
 from support.ranked import Checks
 
 from warmslip import _core, discretise
@@ -359,6 +359,92 @@ def test_a_plane_in_two_parts_guides_as_in_one(d: int) -> None:
         guided = one.override(supports={"displacement": {name: {"normal": 0.0} for name in names}})
         ends.append(field(completed(guided, mesh=there), "u"))
     assert np.abs(ends[0] - ends[1]).max() <= 1e-9 * np.abs(ends[0]).max()
+
+
+def tilt(d: int, angle: float) -> Any:
+    """A rotation in the plane of the first and the last axis."""
+    turn = np.eye(d)
+    turn[np.ix_([0, d - 1], [0, d - 1])] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return turn
+
+
+def turns_alike(one: Any, turn: Any, apart: float = 1e-13, digits: float = 8.0) -> None:
+    """The body with its supports and loads turned completes with the turned answer."""
+    upright = field(completed(one, digits), "u") @ turn.T
+    other, mesh = turned(one, turn)
+    inclined = field(completed(other, digits, mesh=mesh), "u")
+    assert np.abs(inclined - upright).max() <= apart * np.abs(upright).max()
+
+
+@check
+def a_body_rests_between_inclined_guides(d: int) -> None:
+    """Where nothing moves any more a velocity is rounding, and what a guide prescribes of it holds all the same."""
+    still = guides(d) | {"top": {"normal": 0.0}}
+    for more in (
+        {},
+        {"viscosity": {"lame": [0.2, 0.3]}},
+        {"inertia": {"density": 1.0}, "time": {"end": 1e4, "steps": 10}},
+    ):
+        one = pressed(d, still, n=2, **{"time": {"steps": 10}, "loads": {"body": along(d, -2e-3, 1e-3)}} | more)
+        turns_alike(one, tilt(d, 0.3))
+    springs = {"displacement": guides(d), "springs": {"top": {"stiffness": 1.0}}}
+    turns_alike(
+        pressed(d, {}, n=2, supports=springs, time={"steps": 10}, loads={"body": along(d, -2e-3, 1e-3)}), tilt(d, 0.3)
+    )
+
+
+@check
+def a_guide_drives_a_body_that_is_free_along_it(d: int) -> None:
+    """In steps far longer than its waves need."""
+    speed, end = 1e-5, 1e3
+    sides = guides(d) | {SIDES[d][0]: {"normal": f"{speed} * t"}}
+    one = pressed(
+        d,
+        sides,
+        n=2,
+        elasticity=elasticity(d, 1.0, 0.3),
+        inertia={"density": 1.0},
+        time={"end": end, "steps": 2},
+        loads={"body": along(d, 0.0)},
+    )
+    turn = tilt(d, 0.3)
+    other, mesh = turned(one, turn)
+    u = field(completed(other, mesh=mesh), "u") @ turn
+    way = along(d, 0.0, -speed * end)  # the normal points outwards
+    assert np.abs(u - way).max() <= 1e-4 * speed * end  # it strains by rho / k^2
+    turns_alike(one, turn)
+
+
+@check
+def a_guide_may_lie_askew_by_a_hair(d: int) -> None:
+    """As that of a mesh whose file has eight digits does."""
+    one = pressed(
+        d,
+        guides(d) | {"top": {"normal": 0.0}},
+        n=2,
+        inertia={"density": 1.0},
+        loads={"body": along(d, -1e-3, 1e-3)},
+        contact={"part": "bottom", "stiffness": 1.0, "friction": {"coefficient": 0.3}},
+    )
+    for angle in (1e-14, 1e-10, 1e-9, 1e-8, 1e-7, 1e-5):
+        turns_alike(one, tilt(d, angle))
+
+
+@check
+def cohesion_beside_an_inclined_guide(d: int) -> None:
+    """The guide stands on the contact part: along it rounding is no slip."""
+    for n, stiffness in ((1, 1.0), (3, 1.0), (2, "rigid")):
+        for friction in ({"cohesion": 1e-4}, {"coefficient": 0.3, "cohesion": 1e-4}):
+            one = pressed(
+                d,
+                guides(d),
+                n=n,
+                elasticity=elasticity(d, 1.0, 0.3),
+                time={"steps": 2},
+                loads={"body": along(d, -1e-2, 1e-3)},
+                contact={"part": "bottom", "stiffness": stiffness, "friction": friction},
+            )
+            turns_alike(one, tilt(d, 0.3), apart=1e-10)
 
 
 def test_every_component_free_is_no_support() -> None:

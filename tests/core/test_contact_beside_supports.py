@@ -255,6 +255,49 @@ def points_beside_a_roller_share_the_least_friction(d: int) -> None:
             assert np.abs(least).max() > 1e-3 * np.abs(force).max()
 
 
+@check
+def weak_beside_strong(d: int) -> None:
+    """A spring or a dashpot of 1e-12 of another one of the same part holds what that one leaves free."""
+    density, force, k = 7800.0, 100.0, 50.0
+    for stiffness, damping in ((100.0, 0.0), (1e-2, 0.0), (0.0, 100.0)):
+        springs = {"stiffness": along(d, 1e14, stiffness), "damping": along(d, 0.0, damping)}
+        one = pressed(
+            d,
+            {},
+            n=2,
+            time={"end": 2 * k, "steps": 2},
+            elasticity=elasticity(d, 2.1e11, 0.3),
+            inertia={"density": density},
+            supports={"springs": {"top": {name: value for name, value in springs.items() if any(value)}}},
+            loads={"body": along(d, -2e5, force)},
+        )
+        w = u = 0.0
+        for _ in range(2):
+            w = (force + density * w / k - stiffness * u) / (density / k + k * stiffness + damping)
+            u += k * w
+        found = field(completed(one), "u")[:, 0]
+        assert np.abs(found - u).max() <= 1e-6 * u, (stiffness, damping)  # it strains by less
+
+
+@check
+def a_load_on_the_contact_part_goes_into_the_foundation(d: int) -> None:
+    """On a rigid one nothing moves: the point of each node bears what is applied there."""
+    for n, more in ((1, {}), (4, {}), (2, {"inertia": {"density": 1.0}})):
+        one = pressed(
+            d,
+            {"top": [0.0] * d},
+            n=n,
+            elasticity=elasticity(d, 1.0, 0.3),
+            loads={"traction": {"bottom": along(d, -1e-3, 1e-4)}},
+            contact={"part": "bottom", "stiffness": "rigid", "friction": {"coefficient": 0.5}},
+            **more,
+        )
+        simulation = completed(one)
+        assert np.abs(field(simulation, "u")).max() <= 1e-18
+        total = simulation.stepper.contact_force.reshape(-1, d).sum(axis=0)
+        assert np.abs(total - along(d, -1e-3, 1e-4)).max() <= 1e-17
+
+
 def shapes(x: Any, facets: Any, nodes: Any, positions: Any) -> Any:
     """Shape functions of the nodes of a flat part at the points on it, (points, nodes); points come facet by facet."""
     out, each = np.zeros((len(positions), len(nodes))), len(positions) // len(facets)

@@ -226,6 +226,23 @@ def a_body_falls_along_a_wall(d: int) -> None:
             assert np.abs(u - along(d, -fallen)).max() <= 1e-13 * fallen
 
 
+@check
+def a_viscous_body_falls(d: int) -> None:
+    """Without an elasticity: its strain rate is rounding of the fall."""
+    for viscosity, end in ((1.0, 2.0), (1e3, 2e-6), (1e-6, 2.0)):
+        one = scene(
+            d,
+            2,
+            time={"end": end, "steps": 2},
+            inertia={"density": 1.0},
+            viscosity={"lame": [0.0, viscosity]},
+            loads={"body": along(d, -1e-3, 1e-3)},
+            contact={"part": "bottom", "stiffness": 1.0, "gap": 1.0, "friction": {"coefficient": 0.3}},
+        )
+        u = field(completed(one, digits=0.0), "u")
+        assert np.abs(u - 3 * (end / 2) ** 2 * np.asarray(along(d, -1e-3, 1e-3))).max() <= 1e-14 * np.abs(u).max()
+
+
 @pytest.mark.parametrize("backend", ["automatic", "petsc"])
 @pytest.mark.parametrize("density", [1e-3, 1.0, 100.0])
 def test_an_indefinite_coupling_is_refused_and_no_other(density: float, backend: str) -> None:

@@ -196,6 +196,25 @@ def a_block_far_from_the_origin(d: int) -> None:
         assert np.abs(forces(offset) - there).max() <= 1e-13 * np.abs(there).max()
 
 
+@check
+def a_dashpot_beside_springs(d: int) -> None:
+    """Springs along the last axis and a weak dashpot: neither hides the other, whatever the unit of time is."""
+    ends = []
+    for unit in (1.0, 1e-4, 1e4, 1e10):
+        one = scene(
+            d,
+            2,
+            time={"end": 1.0 / unit, "steps": 2},
+            inertia={"density": 1.0},
+            elasticity=elasticity(d, unit**2, 0.3),
+            supports={"springs": {"top": {"stiffness": along(d, 0.03 * unit**2), "damping": 6.5e-5 * unit}}},
+            loads={"body": along(d, -2e-3 * unit**2, 1e-3 * unit**2)},
+        )
+        ends.append(field(completed(one), "u"))
+    for other in ends[1:]:
+        assert np.abs(other - ends[0]).max() <= 1e-13 * np.abs(ends[0]).max()
+
+
 test_on_one_rank, test_on_two_ranks = check.tests(__file__)
 
 

@@ -41,7 +41,9 @@ PointCompliance ContactSolver<d>::diagonal_block(const ContactProblem<d>& proble
   const double half = across.trace() / 2,
                largest =
                    d == 2 ? across.trace() : half + std::sqrt(std::max(0.0, across.squaredNorm() / 2 - half * half));
-  return {problem.step * nu.dot(block * nu), largest / tangential_scale_};
+  // where a support holds the point along its tangent, rounding of the velocity across it is no slip
+  const double normal = nu.dot(block * nu), own = largest > 0 && largest < 1e-9 * normal ? normal : largest;
+  return {problem.step * normal, own / tangential_scale_};
 }
 
 // A point whose motion is given: its force follows from the law, and moves nothing.

@@ -30,6 +30,13 @@ class ContactSurface {
   /// Nodal values, (d nodes), without the directions that supports hold.
   Eigen::VectorXd released(const Eigen::VectorXd& nodal) const { return free_ * nodal; }
 
+  /// The part of a force at a point along tangents that supports hold: it moves nothing.
+  Point<d> held_along(Eigen::Index point, const Point<d>& force) const {
+    const Tensor2<d> held = held_.template middleRows<d>(point * d);
+    const bool across = (held * normals_.row(point).transpose()).norm() > 1e-12;
+    return across ? Point<d>(Point<d>::Zero()) : Point<d>(held * force);
+  }
+
   /// The node whose velocity is that of a point and of no other, and is not held across it; -1 where there is none.
   Eigen::Index own_node(Eigen::Index point) const { return own_nodes_[static_cast<std::size_t>(point)]; }
   /// Adds nodal values, (d nodes), to a displacement-like vector.

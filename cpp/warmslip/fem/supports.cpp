@@ -17,7 +17,7 @@ std::pair<std::vector<PetscInt>, std::vector<HeldNode<d>>> held_unknowns(const L
   for (const auto& [node, held] : held_directions(problem)) {
     Tensor2<d> askew = held;
     for (int a = 0; a < d; ++a) {
-      if (held(a, a) != 1) continue;
+      if (held.row(a) != Tensor2<d>::Identity().row(a)) continue;  // nearly an axis is askew
       if (owns(layout, node)) out.first.push_back(layout.global_of(node) * d + a);
       askew.row(a).setZero();
       askew.col(a).setZero();

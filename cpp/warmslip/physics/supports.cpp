@@ -1,8 +1,27 @@
 #include "warmslip/physics/supports.hpp"
 
+#include <limits>
+
 #include "warmslip/physics/problem.hpp"
 
 namespace warmslip {
+namespace {
+
+// The directions in which a symmetric tensor resists, as rows, zero for the others: a weak one beside a strong one
+// counts as much, down to the rounding of the tensor's entries, of which a diagonal one has none.
+template <int d>
+Tensor2<d> principal(const Tensor2<d>& tensor) {
+  const Tensor2<d> diagonal = tensor.diagonal().asDiagonal();
+  if (tensor == diagonal) return diagonal.unaryExpr([](double one) { return one > 0 ? 1.0 : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<Tensor2<d>> found(tensor);
+  const double rounding = 8 * std::numeric_limits<double>::epsilon() * found.eigenvalues().cwiseAbs().maxCoeff();
+  Tensor2<d> out = found.eigenvectors().transpose();
+  for (int i = 0; i < d; ++i)
+    if (found.eigenvalues()[i] <= rounding) out.row(i).setZero();
+  return out;
+}
+
+}  // namespace
 
 template <int d>
 std::map<Index, Tensor2<d>> held_directions(const Problem<d>& problem) {
@@ -29,9 +48,10 @@ ResistedDirections<d> resisted_directions(const Problem<d>& problem, bool on_spr
     const Facets<d>& facets = problem.mesh->part(springs.part);
     for (Eigen::Index f = 0; f < facets.nodes.rows(); ++f) {
       const Point<d> nu = area_normal(*problem.mesh, facets, f).normalized();
-      const Tensor2<d> tensor = springs.stiffness.on(nu) + springs.damping.on(nu);
-      if (tensor.isZero(0)) continue;
-      for (int i = 0; i < d; ++i) add(facets.nodes(f, i), tensor / tensor.norm());
+      for (const Tensor2<d>& tensor : {springs.stiffness.on(nu), springs.damping.on(nu)}) {  // of units of their own
+        const Tensor2<d> directions = principal<d>(tensor);
+        for (int i = 0; i < d; ++i) add(facets.nodes(f, i), directions);
+      }
     }
   }
   return out;

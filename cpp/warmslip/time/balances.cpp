@@ -21,13 +21,13 @@ BalanceEvaluator<d>::BalanceEvaluator(const Layout<d>& layout, const Problem<d>&
   for (const auto& [a, rows] :
        {std::pair{Mat(operators.elasticity), &Self::elastic_rows_},
         std::pair{Mat(operators.viscosity), &Self::viscous_rows_},
-        std::pair{Mat(operators.expansion), &Self::expansion_rows_},
-        std::pair{Mat(operators.springs), &Self::spring_rows_},
-        std::pair{Mat(operators.dashpots), &Self::dashpot_rows_}, std::pair{Mat(operators.mass), &Self::mass_rows_},
+        std::pair{Mat(operators.expansion), &Self::expansion_rows_}, std::pair{Mat(operators.mass), &Self::mass_rows_},
         std::pair{Mat(operators.conductivity), &Self::conduction_rows_},
         std::pair{Mat(operators.exchange), &Self::exchange_rows_},
         std::pair{Mat(operators.heating), &Self::heating_rows_}})
     this->*rows = like ? like->*rows : row_sizes(a);
+  spring_rows_ = like ? like->spring_rows_ : all_row_sizes(operators.springs);
+  dashpot_rows_ = like ? like->dashpot_rows_ : all_row_sizes(operators.dashpots);
   if (like) {
     inertia_rows_ = like->inertia_rows_;
   } else if (operators.inertia) {  // its entries are positive

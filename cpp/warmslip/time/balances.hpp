@@ -79,7 +79,7 @@ class BalanceEvaluator {
   Eigen::VectorXd force_external_, heat_external_;      // but for the inner forces and the conduction
   double work_magnitude_ = 0;  // in the step that is being closed: of all forces along all displacements
   Eigen::VectorXd inertia_rows_, elastic_rows_, viscous_rows_, expansion_rows_;  // sums of |entries|
-  Eigen::VectorXd spring_rows_, dashpot_rows_;
+  Eigen::VectorXd spring_rows_, dashpot_rows_;  // of every component: a weak spring may stand beside a strong one
   Eigen::VectorXd mass_rows_, conduction_rows_, exchange_rows_, heating_rows_;
   std::vector<PetscInt> unknowns_, nodes_;    // of contact, relative to the owned range
   std::vector<bool> temperature_prescribed_;  // a node

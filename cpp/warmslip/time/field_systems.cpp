@@ -133,6 +133,25 @@ void Stepper<d>::hold(Vec v, Vec given) const {
   }
 }
 
+// Gives the nodes in inclined guides what those prescribe of their velocity: the operator holds them up to rounding of
+// the largest one, which is no motion where a body comes to rest. Rigid motions that are solved for apart run along the
+// guides, and what strains is corrected alone.
+template <int d>
+void Stepper<d>::guide(Vec given) const {
+  const PetscInt first = layout_.owned() ? layout_.global_nodes()[0] : 0;
+  const bool apart = !systems_->rigid.empty();
+  Values strains(apart ? next_.strained_w : next_.w), known(given), whole(apart ? Vec(next_.w) : nullptr);
+  for (const HeldNode<d>& one : operators_.inclined) {
+    if (!owns(layout_, one.node)) continue;
+    const PetscInt at = (layout_.global_of(one.node) - first) * d;
+    Point<d> over = (*strains).template segment<d>(at);
+    if (given) over -= (*known).template segment<d>(at);
+    over = (one.held * over).eval();
+    (*strains).template segment<d>(at) -= over;
+    if (apart) (*whole).template segment<d>(at) -= over;
+  }
+}
+
 // q + M theta_{n-1} / k + E w, less what warm supports conduct; `scale` is that of the heat rows
 template <int d>
 void Stepper<d>::heat_right_side(const StepLoads& loads, Vec heating_w, double scale) {
@@ -212,6 +231,14 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
   solution = systems_->contact->solve(posed_, guess);
   if (solution.converged && surface_.shares())
     minimal_forces(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
+  for (Eigen::Index i = 0; solution.converged && i < surface_.points(); ++i) {  // a guide bears what friction need not
+    const Point<d> along = surface_.held_along(i, solution.velocity.template segment<d>(i * d));
+    if (solution.status[static_cast<std::size_t>(i)] != Status::stick && along.norm() > 1e-14 * largest_entry(free_))
+      continue;
+    const Point<d> borne = surface_.held_along(i, solution.force.template segment<d>(i * d));
+    solution.force.template segment<d>(i * d) -= borne;
+    solution.added.template segment<d>(i * d) -= borne;
+  }
   // every rank solved the same small problem; let them agree to the last bit
   MPI_Bcast(solution.force.data(), static_cast<int>(solution.force.size()), MPI_DOUBLE, 0, layout_.comm());
   MPI_Bcast(solution.added.data(), static_cast<int>(solution.added.size()), MPI_DOUBLE, 0, layout_.comm());
@@ -248,6 +275,7 @@ bool Stepper<d>::solve_motion(const StepLoads& loads, ContactSolution<d>& contac
     systems_->rigid.carry(next_.rigid, next_.w);
   }
   if (systems_->contact) apply_contact_velocity(contact, next_.w, next_.strained_w);
+  guide(loads.support_velocity);
   return true;
 }
 

@@ -15,14 +15,16 @@ struct Resultant {
   static constexpr int moments = d == 2 ? 1 : 3, many = d + moments;
   Eigen::Vector<double, many> sum = Eigen::Vector<double, many>::Zero(), size = sum;
   // a force at a place, and the magnitudes of its own terms: outer ones, and inner ones that count in part
-  void add(const Point<d>& x, const Point<d>& f, double outer, double inner,
+  void add(const Point<d>& x, const Point<d>& f, const Point<d>& outer, double inner,
            const Eigen::Vector<double, many>& shares) {
     sum.template head<d>() += f;
     if constexpr (d == 2)
       sum[2] += x[0] * f[1] - x[1] * f[0];
     else
       sum.template tail<3>() += x.cross(f);
-    const Eigen::Vector<double, many> magnitude = (outer + inner * shares.array()).matrix();
+    Eigen::Vector<double, many> magnitude = inner * shares;
+    magnitude.template head<d>() += outer;
+    magnitude.template tail<moments>().array() += outer.maxCoeff();
     size.template head<d>() += magnitude.template head<d>();
     size.template tail<moments>() += x.norm() * magnitude.template tail<moments>();
   }
@@ -69,7 +71,8 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
   const auto raise = [&](std::size_t which, double value) { largest[which] = std::max(largest[which], value); };
   const double u = std::max(after.sizes.u, before.sizes.u), w = after.sizes.straining,
                w_both = std::max(after.sizes.w, before.sizes.w), theta = in.coupling_theta,
-               reach = std::max(after.reach.maxCoeff(), before.reach.maxCoeff());
+               reach = std::max(after.reach.maxCoeff(), before.reach.maxCoeff()),
+               pressing = in.contact_force.size() ? in.contact_force.template lpNorm<Eigen::Infinity>() : 0;
   const bool warm =
       std::max(theta, std::abs(operators_.common_reference)) > temperature_of_rounding(before, after, in.k);
   {
@@ -93,40 +96,45 @@ void BalanceEvaluator<d>::forces(const TimeLevel& before, const TimeLevel& after
       const double given = size(load) + size(contact_here),
                    expands = std::max(size(expansion), std::abs(operators_.common_reference) * row(expansion_rows_)),
                    stretches = std::max(size(elastic), size(viscous)),
-                   moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k,
-                   sprung = reach * row(spring_rows_) + after.sizes.w * row(dashpot_rows_),
-                   beside = sprung_ ? sprung : 0,  // springs resist more than what strains
-          within = u * row(elastic_rows_) + w * row(viscous_rows_),
-                   magnitude = moved + given + within + beside + theta * row(expansion_rows_);
+                   moved = (size(p1) + size(p0) + w_both * row(inertia_rows_)) / in.k;
+      const auto resists = [i](const Eigen::VectorXd& rows) {
+        return rows.size() ? Point<d>(rows.template segment<d>(i * d)) : Point<d>(Point<d>::Zero());
+      };
+      const Point<d> sprung = reach * resists(spring_rows_) + after.sizes.w * resists(dashpot_rows_),
+                     beside = (sprung_ ? 1 : 0) * sprung;  // springs resist more than what strains
+      const double within = u * row(elastic_rows_) + w * row(viscous_rows_),
+                   inner_forces = within + theta * row(expansion_rows_),
+                   magnitude = moved + given + inner_forces + beside.maxCoeff();
       const int support = support_[static_cast<std::size_t>(i)];
       const Tensor2<d>* held = support >= 0 ? &held_[static_cast<std::size_t>(support)] : nullptr;
       const bool fixed = held && held->isIdentity(0);
       // a force in one direction has no rounding in another, in which the body may be free to move
-      const Point<d> outer =
-          fixed ? Point<d>::Zero() : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs()).array() + moved + beside);
+      const Point<d> outer = fixed ? Point<d>(Point<d>::Zero())
+                                   : Point<d>((load.cwiseAbs() + contact_here.cwiseAbs() + beside).array() + moved);
       if (stores_magnitudes_) force_external_.template segment<d>(i * d) = outer;
       if (stores_magnitudes_)
-        force_magnitudes_.template segment<d>(i * d) =
-            fixed ? outer : Point<d>(outer.array() + (magnitude - moved - given - beside));
+        force_magnitudes_.template segment<d>(i * d) = fixed ? outer : Point<d>(outer.array() + inner_forces);
       if (held) {
         const Point<d> reaction = *held * left;
         const double missed = size(*held * (way - at(*supported)));  // what supports prescribe
         if (missed > 0) raise(backward, missed / w_both);
-        force.add(position, external + springy - reaction, magnitude, 0, shares_);
+        force.add(position, external + springy - reaction, Point<d>::Constant(magnitude), 0, shares_);
         l.support_work += in.k * reaction.dot(way);
         (*reactions).template segment<d>(i * d) = reaction;
       } else {
         // inner forces cancel in the sum over a body; those of springs along a normal are sums of larger terms
-        force.add(position, external + springy, moved + given + sprung, magnitude - moved - given, shares_);
+        force.add(position, external + springy, Point<d>(sprung.array() + moved + given), inner_forces, shares_);
       }
       if (!fixed) {
         const Point<d> over = held ? Point<d>(left - *held * left) : left;
         const double rest = over.allFinite() ? size(over) : std::numeric_limits<double>::infinity();
         raise(defect, rest);
-        // a point at rest has a strain rate of rounding of the rigid motion, which it stops
-        const double least = after.strained && surface_.points() > 0
+        // a point at rest has a strain rate of rounding of the rigid motion, which it stops, or of the velocity that
+        // it would have without its contact force
+        const double stops = after.strained && surface_.points() > 0
                                  ? 1e-5 * w_both * (in.k * row(elastic_rows_) + row(viscous_rows_))
-                                 : 0;
+                                 : 0,
+                     least = stops + std::numeric_limits<double>::epsilon() * pressing;
         if (!(magnitude <= std::numeric_limits<double>::min())) raise(backward, rest / (magnitude + least));
       }
       work += magnitude * (in.k * way.cwiseAbs() + at(*s1).cwiseAbs() + at(*s0).cwiseAbs()).sum();

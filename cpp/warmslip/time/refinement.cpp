@@ -72,9 +72,15 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
     note(errors_.stress, extents_.stress, stress_size(layout_, problem_, change_u, change_w).largest, there.largest,
          1e-8 * there.possible);
     extents_.force = std::max(extents_.force, balances.force_scale);
-    if (next_.elastic_u && extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
-      multiply(operators_.elasticity, change_w, momentum_right_);
-      errors_.stress = std::min(errors_.stress, systems_->k * largest_entry(momentum_right_) / extents_.force);
+    if (extents_.force > 0) {  // inner forces far smaller than the others matter to nobody
+      double inner = 0;
+      for (const auto& [a, factor] :
+           {std::pair{Mat(operators_.elasticity), systems_->k}, std::pair{Mat(operators_.viscosity), 1.0}}) {
+        if (!a) continue;
+        multiply(a, change_w, momentum_right_);
+        inner += factor * largest_entry(momentum_right_);
+      }
+      errors_.stress = std::min(errors_.stress, inner / extents_.force);
     }
   }
   if (systems_->contact) {
@@ -94,6 +100,7 @@ bool Stepper<d>::correct_motion(const StepLoads& loads, const Balances& balances
       WARMSLIP_PETSC(VecAXPY(next_.strained_w, 1, correction_strained_));
       next_.rigid += motions;
     }
+    guide(loads.support_velocity);
   }
   return true;
 }

@@ -23,7 +23,7 @@ double largest_of(std::initializer_list<double> terms) {
   return largest;
 }
 
-Eigen::VectorXd row_sizes(Mat a) {
+Eigen::VectorXd all_row_sizes(Mat a) {
   if (!a) return {};
   PetscInt begin, end;
   WARMSLIP_PETSC(MatGetOwnershipRange(a, &begin, &end));
@@ -35,6 +35,12 @@ Eigen::VectorXd row_sizes(Mat a) {
     for (PetscInt e = 0; e < count; ++e) sizes[row - begin] += std::abs(entries[e]);
     WARMSLIP_PETSC(MatRestoreRow(a, row, &count, nullptr, &entries));
   }
+  return sizes;
+}
+
+Eigen::VectorXd row_sizes(Mat a) {
+  if (!a) return {};
+  const Eigen::VectorXd sizes = all_row_sizes(a);
   PetscInt block;
   WARMSLIP_PETSC(MatGetBlockSizes(a, &block, nullptr));
   return sizes.reshaped(block, sizes.size() / block).colwise().maxCoeff().transpose();

@@ -23,7 +23,10 @@ double relative(double residual, double size);
 
 double largest_of(std::initializer_list<double> terms);
 
-/// Sum of |entries| of every row that this rank owns; the largest of the rows of a node. Empty for no matrix.
+/// Sum of |entries| of every row that this rank owns. Empty for no matrix.
+Eigen::VectorXd all_row_sizes(Mat a);
+
+/// The largest of them for every node.
 Eigen::VectorXd row_sizes(Mat a);
 
 /// Sums of the rows of a matrix that may be known by its products alone (collective).

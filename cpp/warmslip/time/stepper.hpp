@@ -192,6 +192,7 @@ class Stepper {
   StepReport<d> conclude(const StepLoads& loads, const Balances& balances, ContactSolution<d>& contact);
   void products(TimeLevel& level) const;
   bool solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>& solution);
+  void guide(Vec given) const;
   void apply_contact_velocity(const ContactSolution<d>& contact, Vec w, Vec moved) const;
   bool solve_motion(const StepLoads& loads, ContactSolution<d>& contact);
   bool reach_motion(const StepLoads& loads, const Eigen::VectorXd& from, ContactSolution<d>& contact);

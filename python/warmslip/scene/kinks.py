@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -42,7 +43,11 @@ def switches(formula: str) -> list[Switch]:
     """The kinks and jumps of a formula: of abs, min, max, comparisons, floor, ceil and %."""
     tree = ast.parse(formula.strip(), mode="eval")
     found = {(ast.unparse(argument), steps) for node in ast.walk(tree) for argument, steps in _arguments(node)}
-    return [Switch(Expression(text), steps) for text, steps in sorted(found)]
+    out = []
+    for text, steps in sorted(found):
+        with suppress(ValueError):  # t / 0, of t % 0: the values themselves say so
+            out.append(Switch(Expression(text), steps))
+    return out
 
 
 def _arguments(node: ast.AST) -> Iterator[tuple[ast.expr, bool]]:

@@ -169,8 +169,11 @@ class Monitor:
             if callable(value) and not isinstance(value, Formula):
                 return -np.inf, np.inf
             places = x[np.unique(d.mesh.parts[part])]
-            for t in np.linspace(0, end, TIMES + 1) if of_time(value) else (0.0,):
-                values.append(evaluate(value, places, float(t), 1))
+            try:
+                for t in np.linspace(0, end, TIMES + 1) if of_time(value) else (0.0,):
+                    values.append(evaluate(value, places, float(t), 1))
+            except ValueError:  # between the steps a formula may have a pole
+                return -np.inf, np.inf
         sources = [loads.source, *loads.heat_flux.values(), loads.contact_flux]
         signs = {0.0 if callable(one) else float(np.sign(one)) for one in sources if callable(one) or np.any(one)}
         both = any(callable(one) for one in sources) or any(m.heating is not None for m in d.problem.materials)

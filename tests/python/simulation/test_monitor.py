@@ -351,3 +351,16 @@ def test_a_body_at_one_temperature_is_not_said_to_leave_it(d: int, capacity: str
     for _ in simulation.steps():
         pass
     assert not [message for message in summary(simulation)["warnings"] if "the data allow" in message]
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"contact__heat_exchange__foundation_temperature": "1 / (t - 0.5)"},
+        {"supports": {"temperature": {"left": "1 / (t - 0.5)", "top": "1 / (t - 0.25)"}}},
+    ],
+)
+def test_a_pole_between_two_steps_is_never_met(tables: dict[str, Any]) -> None:
+    """Warnings look at data between the steps; what the scheme needs is finite."""
+    done = warmslip.run(build(body(WARM, time={"end": 1.0, "steps": 3}, **tables)))
+    assert done.summary["outcome"] == "completed"
