@@ -275,8 +275,17 @@ def weak_beside_strong(d: int) -> None:
         for _ in range(2):
             w = (force + density * w / k - stiffness * u) / (density / k + k * stiffness + damping)
             u += k * w
-        found = field(completed(one), "u")[:, 0]
+        found = field(completed(one, digits=6.0), "u")[:, 0]
         assert np.abs(found - u).max() <= 1e-6 * u, (stiffness, damping)  # it strains by less
+    held = pressed(  # without inertia too
+        d,
+        {},
+        n=2,
+        elasticity=elasticity(d, 2.1e11, 0.3),
+        supports={"springs": {"top": {"stiffness": [100.0] * (d - 1) + [1e14]}}},
+        loads={"body": along(d, -2e5, force)},
+    )
+    assert np.abs(field(completed(held, digits=6.0), "u")[:, 0] - force / 100.0).max() <= 1e-6
 
 
 @check

@@ -77,18 +77,35 @@ RigidMotions::Resisted resisted(const Problem<d>& problem, bool on_springs) {
   return {directions.nodes, {directions.rows.begin(), directions.rows.end()}};
 }
 
-// Whether a part of an operator, times its factor, holds some node about as well as the body around it does.
-bool holds_a_node(Mat part, double factor, Mat whole) {
+// Whether all that supports and springs resist lies along the axes.
+template <int d>
+bool along_axes(const Problem<d>& problem) {
+  const std::vector<Point<d>> rows = resisted_directions(problem, true).rows;
+  return std::all_of(rows.begin(), rows.end(), [](const Point<d>& row) { return (row.array() != 0).count() <= 1; });
+}
+
+// Whether an entry of the diagonal of a part of an operator, times its factor, is to the whole's as `is` says.
+template <class Is>
+bool any_entry(Mat part, double factor, Mat whole, Is is) {
   if (!part) return false;
   const VecHandle own = diagonal_of(part), all = diagonal_of(whole);
   const Eigen::Index block = block_size(own), width = block_size(all);
   Values held(own), entries(all);
-  const Eigen::Index nodes = (*held).size() / block;
-  int holds =
-      (factor * (*held).reshaped(block, nodes).array() > 0.3 * (*entries).reshaped(width, nodes).topRows(block).array())
-          .any();
-  MPI_Allreduce(MPI_IN_PLACE, &holds, 1, MPI_INT, MPI_LOR, PetscObjectComm(reinterpret_cast<PetscObject>(part)));
-  return holds != 0;
+  const auto nodes = (*held).size() / block;
+  int found = 0;
+  for (Eigen::Index i = 0; i < nodes && !found; ++i)
+    for (Eigen::Index c = 0; c < block; ++c) found |= is(factor * (*held)[i * block + c], (*entries)[i * width + c]);
+  MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_LOR, PetscObjectComm(reinterpret_cast<PetscObject>(part)));
+  return found != 0;
+}
+
+// Whether a part holds some node about as well as the body around it does, and whether it holds one far less.
+bool holds_a_node(Mat part, double factor, Mat whole) {
+  return any_entry(part, factor, whole, [](double own, double all) { return own > 0.3 * all; });
+}
+
+bool hardly_holds_one(Mat part, double factor, Mat whole) {
+  return any_entry(part, factor, whole, [](double own, double all) { return own > 0 && own < 1e-3 * all; });
 }
 
 }  // namespace
@@ -167,10 +184,12 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
     };
     rigid = left_by(true);
     partly = !rigid.empty();
-    // springs hold motions as a mass does; where they leave some to a mass or to contact, only if they are weak
+    // springs hold motions as a mass does; where they leave some to a mass or to contact, only if they are weak, and if
+    // what they leave to a mass has no rounding of their forces, as that of springs along the axes has none
     const bool strong = holds_a_node(operators.springs, 1, operators.elasticity) ||
                         holds_a_node(operators.dashpots, 1, operators.viscosity);
-    if (!problem.springs.empty() && !(partly && (problem.inertial() || strong))) {
+    const bool weak = hardly_holds_one(operators.springs, k, a) || hardly_holds_one(operators.dashpots, 1, a);
+    if (!problem.springs.empty() && !(partly && (problem.inertial() ? !(weak && along_axes(problem)) : strong))) {
       rigid = left_by(false);
       sprung = !rigid.empty();
     }
