@@ -13,6 +13,9 @@ constexpr const char* unsupported =
     "what it touches, or is balanced on its points; give it a support, friction or an [inertia] table";
 
 constexpr const char* no_solution = "no stage of the contact solver reached the law; take smaller steps";
+constexpr const char* none_may_exist =
+    "no stage of the contact solver reached the law; take smaller steps, or, where the loads may exceed what friction "
+    "bears, give the body another support or an [inertia] table";
 
 // A step of which nothing is known: its residuals are not numbers.
 template <int d>
@@ -277,7 +280,9 @@ StepReport<d> Stepper<d>::attempt(const StepLoads& loads) {
     StepReport<d> report = vanish                ? not_taken<d>(Outcome::not_finite, squares_gone)
                            : !finite             ? not_taken<d>(Outcome::not_finite, beyond_doubles)
                            : contact.unsupported ? not_taken<d>(Outcome::unsupported, unsupported)
-                                                 : not_taken<d>(Outcome::contact_not_converged, no_solution);
+                           : systems_->rigid.empty() || problem_.inertial()
+                               ? not_taken<d>(Outcome::contact_not_converged, no_solution)
+                               : not_taken<d>(Outcome::contact_not_converged, none_may_exist);
     report.stage = contact.stage;
     report.newton_iterations = contact.iterations;
     if (finite) report.balances.law_residual = contact.law_residual;

@@ -14,6 +14,7 @@ from warmslip.mesh.raw import Raw
 THIN = 1e-3  # share of a quadrangle in the smaller of its halves, below which the other diagonal is tried
 FLAT = 1e-14  # volume of a cell over the power of its size, below which the core takes it for flat
 SAME = 1e-12  # distance of nodes at one place over the size of the body
+INSIDE = 1e-6  # barycentric coordinate of a node that lies inside a cell
 
 
 def simplices(raw: Raw, dim: int, *, plane: bool) -> tuple[Any, dict[int, Any], int]:
@@ -130,6 +131,29 @@ def check_connected(nodes: Any, cells: Any, boundary: Any, tags: Any) -> None:
         stray = int((label[cells[:, 0]] != label[cells[0, 0]]).argmax())
         near, far = (", ".join(map(str, tags[cells[i]])) for i in (0, stray))
         raise ValueError(f"{pieces}, such as the cells of the nodes {near} and of {far}; mesh one body")
+
+
+def check_apart(nodes: Any, cells: Any, boundary: Any, tags: Any) -> None:
+    """Raises ValueError where a cell covers a node of other cells; of two that overlap, one has a facet on the boundary."""
+    from scipy.spatial import cKDTree
+
+    outside = np.zeros(len(nodes), bool)
+    outside[boundary] = True
+    some = cells[outside[cells].sum(axis=1) >= nodes.shape[1]]
+    centres = nodes[some].mean(axis=1)
+    sizes = np.linalg.norm(nodes[some] - centres[:, None], axis=2).max(axis=1)
+    near = cKDTree(nodes).query_ball_point(centres, sizes)
+    cell = np.repeat(np.arange(len(some)), [len(one) for one in near])
+    node = np.concatenate([np.empty(0, np.int64), *(np.asarray(one, np.int64) for one in near)])
+    edges = (nodes[some[:, 1:]] - nodes[some[:, :1]]).transpose(0, 2, 1)
+    rest = np.linalg.solve(edges[cell], (nodes[node] - nodes[some[cell, 0]])[:, :, None])[:, :, 0]
+    covered = (rest.min(axis=1) > INSIDE) & (rest.sum(axis=1) < 1 - INSIDE)
+    if covered.any():
+        i = int(covered.argmax())
+        corners = ", ".join(map(str, tags[some[cell[i]]]))
+        raise ValueError(
+            f"cells overlap: the node {tags[node[i]]} lies inside the cell of the nodes {corners}; repair the mesh there"
+        )
 
 
 def _coincident(nodes: Any, among: Any) -> tuple[int, int, int] | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warmslip.mesh.body import check_connected, oriented, simplices
+from warmslip.mesh.body import check_apart, check_connected, oriented, simplices
 from warmslip.mesh.elements import SHAPES
 from warmslip.mesh.facets import incidence
 from warmslip.mesh.groups import boundary_parts, lower, named
@@ -69,7 +69,9 @@ def convert(raw: Raw, digest: str) -> MeshFile:
     cells = oriented(points, cells, raw.tags)
     found = incidence(cells, facets, raw.tags)
     number = np.cumsum(used) - 1
-    check_connected(points[used], number[cells], number[found.boundary], raw.tags[used])
+    body = points[used], number[cells], number[found.boundary], raw.tags[used]
+    check_connected(*body)
+    check_apart(*body)
     groups, remarks = named(raw, dim - 1, of_facets)
     regions, more = named(raw, dim, of_cells)
     parts, others = boundary_parts(groups, facets, found.cells)

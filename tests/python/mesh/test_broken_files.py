@@ -187,3 +187,26 @@ def test_nodes_at_one_place_are_to_be_merged(gap: float) -> None:
         ValueError, match=r"^4 nodes lie where another one does, such as 1 and 25 at \(1, 0\); merge them"
     ):
         convert(gmsh.parse(data), "")
+
+
+def test_a_cell_over_others_is_refused() -> None:
+    """It shares no facet with them, and would add its mass and stiffness to theirs."""
+    nodes = [(x, y) for y in range(4) for x in range(4)]
+    cells = [
+        triangle
+        for y in range(3)
+        for x in range(3)
+        for i in (1 + x + 4 * y,)
+        for triangle in ((i, i + 1, i + 5), (i, i + 5, i + 4))
+    ]
+    for several, sound in ((cells, True), ([*cells, (1, 4, 16)], False)):
+        tables = ["$Nodes", "16", *(f"{i} {x} {y} 0" for i, (x, y) in enumerate(nodes, 1)), "$EndNodes", "$Elements"]
+        tables += [str(len(several)), *(f"{i} 2 0 {a} {b} {c}" for i, (a, b, c) in enumerate(several, 1))]
+        data = "\n".join(["$MeshFormat\n2.2 0 8\n$EndMeshFormat", *tables, "$EndElements\n"]).encode()
+        if sound:
+            assert len(convert(gmsh.parse(data), "").cells) == 18
+        else:
+            with pytest.raises(
+                ValueError, match="cells overlap: the node 7 lies inside the cell of the nodes 1, 4, 16"
+            ):
+                convert(gmsh.parse(data), "")
