@@ -32,6 +32,7 @@ THIN, DOTTED, DASHED = 0.7, (0, (1, 1)), (0, (4, 2))
 CORNERS = "mesh.graded_to=['corners']"
 GRADED = "time.graded_to=[0.0] time.halvings=8 time.steps=M/4"
 MORE = "time.graded_to=[0.0] time.halvings=6 time.steps=M"
+FEWER = "time.graded_to=[0.0] time.halvings=5 time.steps=3M/4"
 LOOKS = {
     "equal steps": Look("mesh.n=N time.steps=M", INK, "o"),
     "equal steps, lagged": Look("time.coupling=lagged", GREY, "h", width=THIN),
@@ -47,7 +48,7 @@ LOOKS = {
     "graded mesh": Look(CORNERS, GREY, "d"),
     "graded mesh and steps": Look(f"{CORNERS} {GRADED}", VERMILLION, "^"),
     "graded mesh, more graded steps": Look(f"{CORNERS} {MORE}", VERMILLION, "<", width=2),
-    "graded mesh, fewer halvings": Look(f"{CORNERS} {MORE.replace('=6', '=5')}", VERMILLION, ">", DASHED),
+    "graded mesh, fewer graded steps": Look(f"{CORNERS} {FEWER}", VERMILLION, ">", DASHED),
     "graded mesh, adaptive steps": Look(f"{CORNERS} time.tolerance=16/M^2 time.steps=8", BLUE, "v"),
     ORDINARY: Look("other_codes.py --code ordinary-Newton", INK, "P", DOTTED),
     FACTORED: Look("other_codes.py --code SciPy,-factored-once", INK, "*", DOTTED),

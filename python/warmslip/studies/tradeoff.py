@@ -33,8 +33,12 @@ def _graded_steps(n: int, steps: int) -> Keys:
     return {"mesh.n": n, "time.steps": max(4, steps // 4), "time.graded_to": [0.0], "time.halvings": 8}
 
 
-def _more_graded_steps(n: int, steps: int, halvings: int = 6) -> Keys:
-    return {"mesh.n": n, "time.steps": max(4, steps), "time.graded_to": [0.0], "time.halvings": halvings}
+def _more_graded_steps(n: int, steps: int) -> Keys:
+    return {"mesh.n": n, "time.steps": max(4, steps), "time.graded_to": [0.0], "time.halvings": 6}
+
+
+def _fewer_graded_steps(n: int, steps: int) -> Keys:
+    return {"mesh.n": n, "time.steps": max(4, 3 * steps // 4), "time.graded_to": [0.0], "time.halvings": 5}
 
 
 def _adaptive(n: int, steps: int, factor: float = 16.0) -> Keys:
@@ -57,7 +61,7 @@ METHODS: dict[str, Callable[[int, int], Keys]] = {
     "graded mesh": lambda n, m: _equal(n, m) | CORNERS,
     "graded mesh and steps": lambda n, m: _graded_steps(n, m) | CORNERS,
     "graded mesh, more graded steps": lambda n, m: _more_graded_steps(n, m) | CORNERS,
-    "graded mesh, fewer halvings": lambda n, m: _more_graded_steps(n, m, 5) | CORNERS,
+    "graded mesh, fewer graded steps": lambda n, m: _fewer_graded_steps(n, m) | CORNERS,
     "graded mesh, adaptive steps": lambda n, m: _adaptive(n, m) | CORNERS,
 }
 
@@ -66,7 +70,7 @@ SHORT_STEPS = (
     "more graded steps",
     "adaptive steps, smaller tolerance",
     "graded mesh, more graded steps",
-    "graded mesh, fewer halvings",
+    "graded mesh, fewer graded steps",
 )
 
 
