@@ -289,6 +289,48 @@ def weak_beside_strong(d: int) -> None:
 
 
 @check
+def springs_in_steps_of_several_sizes(d: int) -> None:
+    """Which motions springs and mass hold is the same in all of them."""
+    one = pressed(
+        d,
+        {},
+        n=2,
+        time={"end": 0.2, "steps": 2, "graded_to": [0.2], "halvings": 3},
+        elasticity=elasticity(d, 1.0, 0.3),
+        inertia={"density": 1.0},
+        supports={"springs": {"right": {"normal_stiffness": 2.0}}},
+        initial={"velocity": along(d, -3e-4, 2e-4)},
+        contact={"part": "bottom", "stiffness": "rigid"},
+    )
+    completed(one)
+
+
+@check
+def a_moving_foundation_rubs_a_node_in_a_guide(d: int) -> None:
+    """Its friction is what the law says, also where regularisation calls it sticking and the guide bears it."""
+    speed, scale = 1e-4, 2.0
+    one = pressed(
+        d,
+        guides(d) | {"top": {"normal": 0.0}},
+        n=2,
+        elasticity=elasticity(d, 1.0, 0.3),
+        contact={
+            "part": "bottom",
+            "stiffness": 1.5,
+            "gap": -1e-3,
+            "velocity": along(d, 0.0, speed),
+            "friction": {"coefficient": 0.5, "regularisation": scale},
+        },
+    )
+    simulation = completed(one)
+    positions = np.asarray(simulation.discretisation.surface.positions)
+    at = np.flatnonzero(positions[:, 0] == 0)
+    force = simulation.stepper.contact_force.reshape(-1, d)[at]
+    assert (force[:, -1] != 0).all()
+    assert force[:, 0] == pytest.approx(-0.5 * np.abs(force[:, -1]) * speed / scale, rel=1e-6)
+
+
+@check
 def a_load_on_the_contact_part_goes_into_the_foundation(d: int) -> None:
     """On a rigid one nothing moves: the point of each node bears what is applied there."""
     for n, more in ((1, {}), (4, {}), (2, {"inertia": {"density": 1.0}})):

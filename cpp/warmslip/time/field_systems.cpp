@@ -233,8 +233,7 @@ bool Stepper<d>::solve_contact(const Eigen::VectorXd& guess, ContactSolution<d>&
     minimal_forces(posed_, surface_.moving_shape(), options_.contact.tolerance, solution);
   for (Eigen::Index i = 0; solution.converged && i < surface_.points(); ++i) {  // a guide bears what friction need not
     const Point<d> along = surface_.held_along(i, solution.velocity.template segment<d>(i * d));
-    if (solution.status[static_cast<std::size_t>(i)] != Status::stick && along.norm() > 1e-14 * largest_entry(free_))
-      continue;
+    if (along.norm() > 1e-14 * largest_entry(free_)) continue;
     const Point<d> borne = surface_.held_along(i, solution.force.template segment<d>(i * d));
     solution.force.template segment<d>(i * d) -= borne;
     solution.added.template segment<d>(i * d) -= borne;

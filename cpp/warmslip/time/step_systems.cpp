@@ -104,8 +104,8 @@ bool holds_a_node(Mat part, double factor, Mat whole) {
   return any_entry(part, factor, whole, [](double own, double all) { return own > 0.3 * all; });
 }
 
-bool hardly_holds_one(Mat part, double factor, Mat whole) {
-  return any_entry(part, factor, whole, [](double own, double all) { return own > 0 && own < 1e-3 * all; });
+bool hardly_holds_one(Mat part, Mat whole) {
+  return any_entry(part, 1, whole, [](double own, double all) { return own > 0 && own < 1e-3 * all; });
 }
 
 }  // namespace
@@ -188,7 +188,9 @@ void StepSystems<d>::factor_motion(const Layout<d>& layout, const Problem<d>& pr
     // what they leave to a mass has no rounding of their forces, as that of springs along the axes has none
     const bool strong = holds_a_node(operators.springs, 1, operators.elasticity) ||
                         holds_a_node(operators.dashpots, 1, operators.viscosity);
-    const bool weak = hardly_holds_one(operators.springs, k, a) || hardly_holds_one(operators.dashpots, 1, a);
+    const bool weak = hardly_holds_one(operators.springs, operators.elasticity) ||
+                      (problem.has(&Material<d>::viscosity) ? hardly_holds_one(operators.dashpots, operators.viscosity)
+                                                            : bool(operators.dashpots));  // of no step's size
     if (!problem.springs.empty() && !(partly && (problem.inertial() ? !(weak && along_axes(problem)) : strong))) {
       rigid = left_by(false);
       sprung = !rigid.empty();
