@@ -189,7 +189,7 @@ def measure(full: Scene, chosen: dict[str, str]) -> dict[str, Any]:
     cost, operators = simulation.stepper.cost, simulation.discretisation.operators
     # an estimate of the digits looks at the stress, and at what errors of the velocity and of the temperature make of the other
     products -= cost.estimates * sum(
-        getattr(operators, name) is not None for name in ("elasticity", "heating", "expansion")
+        getattr(operators, name) is not None for name in ("elasticity", "viscosity", "heating", "expansion")
     )
     return (
         chosen

@@ -50,7 +50,9 @@ def test_no_solve_for_what_is_absent(chosen: dict[str, str]) -> None:
     products = product.getPerfInfo()["count"] - before
     simulation = Simulation(block_cost.scene(FULL, chosen))
     there = [name for name in OPERATORS if getattr(simulation.discretisation.operators, name) is not None]
-    estimates = counted.stepper.cost.estimates * sum(name in there for name in ("elasticity", "heating", "expansion"))
+    estimates = counted.stepper.cost.estimates * sum(
+        name in there for name in ("elasticity", "viscosity", "heating", "expansion")
+    )
     assert products == 10 * len(there) + estimates and there == sorted(expected(chosen), key=OPERATORS.index)
     minimal = block_cost.MinimalStep(simulation)
     for _ in simulation.steps():
