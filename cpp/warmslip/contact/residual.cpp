@@ -44,7 +44,6 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
     return std::numeric_limits<double>::infinity();
   largest = std::max(largest, max_bound);
   const double rounding = 2 * std::numeric_limits<double>::epsilon() * motion.norm();  // of a penetration
-  constexpr double many = 32;  // of those that a point without a force may be in
   double worst = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const auto& point = problem.points[i];
@@ -68,8 +67,7 @@ double law_residual(const ContactProblem<d>& problem, const Eigen::VectorXd& for
       continue;
     }
     const double off = std::abs(lambda - point.weight * law.compliance.pressure(r)),
-                 known = lambda > 0 ? rounding : many * rounding,
-                 away = std::max(distance(law.compliance, std::max(lambda, 0.0) / point.weight, r) - known, 0.0),
+                 away = std::max(distance(law.compliance, std::max(lambda, 0.0) / point.weight, r) - rounding, 0.0),
                  pull = std::max(-lambda, 0.0);
     const auto of_forces = [&](double force) { return largest > 0 ? force / largest : unlimited; };
     const double apart = std::max(away > 0 ? away / reach : 0.0, pull > 0 ? of_forces(pull) : 0.0);
